@@ -172,7 +172,8 @@ def backbone_levels(
         text = (f"{own}: stiffness or damping of {', '.join(wrong)} is not positive: the models do not have this mode "
                 "at this frequency, or lose more energy than it does")  # fmt: skip
         findings.append(warn("model", text, (own,)))
-    return of_levels({own: found}, {}, findings, chosen, share)
+    around = whole.joint if isinstance(whole.joint, LawJoint) else None
+    return of_levels({own: found}, {}, findings, chosen, share, dict.fromkeys(backbone.labels, around))
 
 
 def _dof(whole: Assembly, dof: str | None) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,8 @@ from jointfrf.identification.derived import Derived
 from jointfrf.identification.findings import Finding, note, warn, worst_first
 from jointfrf.identification.result import Fit, columns_of
 from jointfrf.kernel.arguments import as_names, as_probability, check_choice
+from jointfrf.laws.law_joint import LawJoint
+from jointfrf.laws.springs import SpringLaw
 
 __all__ = ["JointLevel", "JointLevels", "check_laws", "levels", "of_levels"]
 
@@ -79,6 +81,10 @@ class JointLevels:
     findings : tuple of Finding
     probability : float
         Of the intervals.
+    joints : dict of str to LawJoint
+        The joint at each level, by the labels of tests: springs of the secant stiffness in place of what was found,
+        the rest as it was fitted. `write_joint` keeps it, `LawJoint.export` writes cards. None where a stiffness is
+        not positive.
     """
 
     levels: dict[str, tuple[JointLevel, ...]]
@@ -86,6 +92,7 @@ class JointLevels:
     refused: dict[str, str]
     findings: tuple[Finding, ...]
     probability: float = 0.95
+    joints: dict[str, LawJoint] = field(default_factory=dict)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -183,7 +190,7 @@ def levels(
     share, named = as_probability("probability", probability), _labels(fits, drives, labels)
     chosen = check_laws(laws)
     found: dict[str, list[JointLevel]] = {}
-    refused, findings = dict[str, str](), list[Finding]()
+    refused, findings, around = dict[str, str](), list[Finding](), dict[str, LawJoint | None]()
     for fit, drive, label in zip(fits, drives, named, strict=True):
         try:
             one = _followed(fit, drive)
@@ -197,11 +204,12 @@ def levels(
             findings.append(warn("bent", text, tuple(one.bent)))
             continue
         findings += _of_fit(one, label)
+        around[label] = one.fit.laws
         for dof in one.lines:
             found.setdefault(dof, []).append(_level(one, dof, label, share))
     if not found:
         raise ValueError(f"every test is bent by amplitude: {next(iter(refused.values()))}; {_CURE}")
-    return of_levels(found, refused, findings, chosen, share)
+    return of_levels(found, refused, findings, chosen, share, around)
 
 
 def check_laws(laws: Iterable[str]) -> tuple[str, ...]:
@@ -218,8 +226,12 @@ def of_levels(
     findings: list[Finding],
     laws: Sequence[str],
     share: float,
+    around: Mapping[str, LawJoint | None],
 ) -> JointLevels:
-    """Return levels in the order of their amplitude, with laws fitted to them where there are any to fit."""
+    """Return levels in the order of their amplitude, with laws fitted to them where there are any to fit.
+
+    `around` is the joint of each test beside the springs that were found.
+    """
     ordered = {dof: tuple(sorted(own, key=lambda one: one.amplitude)) for dof, own in found.items()}
     of_laws: dict[str, AmplitudeLawFits] = {}
     for dof, own in ordered.items():
@@ -236,7 +248,19 @@ def of_levels(
             findings.append(warn("residual", text, (dof,)))
         if why:
             findings.append(note("left out", f"{dof}: no laws are fitted to {why}", (dof,)))
-    return JointLevels(ordered, of_laws, refused, worst_first(findings), share)
+    joints = {label: joint for label, one in around.items() if (joint := _secant(found, label, one)) is not None}
+    return JointLevels(ordered, of_laws, refused, worst_first(findings), share, joints)
+
+
+def _secant(found: Mapping[str, Sequence[JointLevel]], label: str, around: LawJoint | None) -> LawJoint | None:
+    """Return the joint of a test with springs of its secant stiffness; None where one is not positive."""
+    own = {dof: one for dof, levels in found.items() for one in levels if one.label == label}
+    if min(one.stiffness.value for one in own.values()) <= 0:
+        return None
+    springs = {(dof, dof): SpringLaw(k := one.stiffness.value, h=k * one.loss_factor.value) for dof, one in own.items()}
+    if around is None:
+        return LawJoint(springs)
+    return LawJoint({**around.laws, **springs}, around.rigid, around.mass, around.dofs)
 
 
 def _labels(fits: Sequence[Fit], drives: Sequence[Drive], labels: Sequence[str] | None) -> tuple[str, ...]:
@@ -316,12 +340,9 @@ def _level(one: _Followed, dof: str, label: str, share: float) -> JointLevel:
     fit, own = one.fit, one.lines[dof]
     k = fit.derived(f"{{k_{dof}}}", share)
     names = {each.name for each in fit.parameters}
-    if f"h_{dof}" in names:
-        eta = fit.derived(f"{{h_{dof}}} / {{k_{dof}}}", share)
-    elif f"c_{dof}" in names:
-        eta = fit.derived(f"{own.omega!r} * {{c_{dof}}} / {{k_{dof}}}", share)
-    else:
-        eta = Derived(0.0, 0.0, 0.0, 0.0)
+    terms = {f"h_{dof}": "", f"c_{dof}": f"{own.omega!r} * "}
+    lossy = " + ".join(f"{factor}{{{name}}}" for name, factor in terms.items() if name in names)
+    eta = fit.derived(f"({lossy}) / {{k_{dof}}}", share) if lossy else Derived(0.0, 0.0, 0.0, 0.0)
     a = own.mean_amplitude
     force = a * k.value * float(abs(1 + 1j * eta.value))
     return JointLevel(label, a, *own.range(), one.orders[dof], force, k, eta)

@@ -45,7 +45,7 @@ from jointfrf.laws.law_joint import LawJoint
 from jointfrf.report.fit_page import write_report
 from jointfrf.spelling import did_you_mean
 
-__all__ = ["add_arguments", "run"]
+__all__ = ["add_arguments", "options_of_compliance", "run"]
 
 #: Methods that need no model.
 _METHODS = ("compliance", "inverse-substructuring")
@@ -298,7 +298,7 @@ def _fit(
         warnings.simplefilter("ignore", ConvergenceWarning)
         warnings.simplefilter("ignore", FrfCheckWarning)  # printed with the names of the channels
         if method == "compliance":
-            options = _of_compliance(args, frfs, joint, laws)
+            options = options_of_compliance(args, frfs, joint, laws)
             if sides:
                 options["sides"] = sides
             return identify(frfs.freq_hz, joint.h, joint.dofs, args.band, **options)
@@ -315,7 +315,7 @@ def _square(joint: MeasuredJoint) -> np.ndarray:
     return np.ascontiguousarray(joint.responses.transform @ joint.h @ joint.forces.transform.T)
 
 
-def _of_compliance(
+def options_of_compliance(
     args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, laws: LawJoint | None
 ) -> dict[str, Any]:
     """Return the options of the compliance fit: damping, cross terms, noise, coherence where the file has it."""

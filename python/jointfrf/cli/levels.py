@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import re
 import warnings
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -17,12 +18,17 @@ from jointfrf.amplitude.levels import JointLevel, JointLevels, levels
 from jointfrf.amplitude.lines import Drive, MotionQuantity
 from jointfrf.assembly_file.measured import measured_assembly
 from jointfrf.assembly_file.read import read_assembly_file
-from jointfrf.cli.measured_file import READING, add_reading_arguments, parse_band, read_receptances, words
+from jointfrf.cli.identify import options_of_compliance
+from jointfrf.cli.measured_file import READING, add_joint_arguments, read_receptances, words
+from jointfrf.cli.measured_joint import measured_joint
 from jointfrf.cli.parser import CommandParser, one_of
-from jointfrf.cli.usage import Output, UsageError, check_folder, waiting, warn_of_ignored
+from jointfrf.cli.usage import Output, UsageError, check_folder, check_out, waiting, warn_of_ignored
 from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
 from jointfrf.extras import check_extras
 from jointfrf.files import write_file
+from jointfrf.identification.fit_data import FitData
+from jointfrf.identification.identify import identify
+from jointfrf.identification.joint_file import write_joint
 from jointfrf.identification.result import Fit
 from jointfrf.io.csv_file import read_text_table
 from jointfrf.report.levels_page import levels_csv, write_levels
@@ -30,6 +36,13 @@ from jointfrf.spelling import did_you_mean
 
 __all__ = ["add_arguments", "run"]
 
+#: Options that say where FRFs at the joint are.
+_OF_THE_JOINT = ("--j", "--k", "--dofs", "--at", "--at-k", "--channels", "--spacing", "--axis")
+#: What `identify` would ask besides of FRFs at the joint: K* of no cross terms, damping by what the data support.
+_AS_IDENTIFY: dict[str, Any] = {
+    "points": None, "same": None, "damping": "auto", "cross": "zero", "window_decay": None, "setup_gain": None,
+    "common_gain": None,
+}  # fmt: skip
 #: Columns of a table of tests.
 _FILE, _LABEL, _LEVEL = "file", "label", "level"
 
@@ -46,10 +59,11 @@ def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         "Stiffness and loss factor of a joint over the amplitude of its motion: one file a level, each fitted with "
-        "the models of assembly.toml, or the backbone of a mode; laws over amplitude fitted to all."
+        "the models of assembly.toml or, as by identify, to FRFs at the joint; or the backbone of a mode. Laws over "
+        "amplitude are fitted to all."
     )
     parser.add_argument("files", type=Path, nargs="*", metavar="FILE", help="measured FRFs, one file for each level")
-    parser.option("--model FILE", "assembly.toml, as for identify", Path)
+    parser.option("--model FILE", "assembly.toml, as for identify; without it FRFs at the joint (--j, --k)", Path)
     parser.option(
         "--table FILE",
         "instead of files: a table (CSV) with columns file and level, perhaps label; files beside it",
@@ -58,8 +72,8 @@ def add_arguments(parser: CommandParser) -> None:
     parser.heading("what was held in each test")
     parser.option(
         "--held WHAT",
-        "what had its level on all lines: force (default), a response as the models name it (B/25:y), or joint:DOF for "
-        "the relative motion of a joint DOF (joint:theta_z)",
+        "what had its level on all lines: force (default), a response as the models name it (B/25:y; without models as "
+        "the file does, 101:+y), or joint:DOF for the relative motion of a joint DOF (joint:theta_z)",
         default="force",
     )
     parser.option(
@@ -80,12 +94,17 @@ def add_arguments(parser: CommandParser) -> None:
     parser.option("--errors FREQUENCY,DAMPING", "relative standard errors (0.001,0.05); damping: or of force", _numbers)
     parser.heading("the fits")
     parser.option("--noise LEVEL", "relative noise of the FRFs, 0.01 for 1 %% (default: from them)", float)
-    parser.option("--band LOW:HIGH", "frequency band in Hz; may be repeated", parse_band, repeated=True)
     parser.option("--laws NAME,...", f"laws over amplitude that are fitted: {', '.join(AMPLITUDE_LAWS)} (all)", _laws)
-    add_reading_arguments(parser)
+    add_joint_arguments(parser)
     parser.heading("results")
     parser.option("--report FILE", "write a page (HTML) with figures of stiffness and loss factor over amplitude", Path)
     parser.option("--output FILE", "write the result as a table (CSV)", Path)
+    parser.option(
+        "--joints DIR",
+        "write the joint of each level, springs of its secant stiffness and damping, as DIR/LABEL.toml: export writes "
+        "cards of it, couple takes it",
+        Path,
+    )
 
 
 def _numbers(word: str) -> list[float]:
@@ -101,13 +120,18 @@ def _laws(word: str) -> list[str]:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
-    if args.model is None:
-        raise UsageError("--model is missing: assembly.toml says what both parts and the joint are")
+    if args.model is not None:
+        warn_of_ignored(args, _OF_THE_JOINT, "it is for FRFs at the joint, without --model")
+    elif args.backbone is not None or args.j is None:
+        why = "a backbone needs it" if args.backbone is not None else "name the joint in the files by --j, --k, --dofs"
+        raise UsageError(f"--model is missing: assembly.toml says what both parts and the joint are; {why}")
     for option, path in (("--report", args.report), ("--output", args.output)):
         check_folder(option, path)
     if args.report is not None:
         check_extras("jinja2")
         check_extras("matplotlib")
+    if args.joints is not None:
+        check_out("--joints", args.joints)
     out = Output(args)
     found, about = _of_fits(args) if args.backbone is None else _of_backbone(args)
     written = []
@@ -116,11 +140,22 @@ def run(args: argparse.Namespace) -> int:
     if args.output is not None:
         write_file(args.output, levels_csv(found))
         written.append(args.output)
+    if args.joints is not None:
+        written += _write_joints(found, args.joints)
     out.say(found, *([""] if written else []), *(f"wrote {path}" for path in written))
     out.warn(*found.warnings)
     by_dof = {dof: [_by_name(one) for one in own] for dof, own in found.levels.items()}
-    out.give(about | asdict(found) | {"levels": by_dof, "written": [str(path) for path in written]})
+    out.give(about | asdict(replace(found, joints={})) | {"levels": by_dof, "written": [str(path) for path in written]})
     return 1 if found.refused else 0
+
+
+def _write_joints(found: JointLevels, folder: Path) -> list[Path]:
+    """Write the joint of each level by its label."""
+    names = {label: re.sub(r"[^\w.+-]", "_", label) for label in found.joints}
+    if len(set(names.values())) < len(names):
+        raise UsageError("--joints: two labels give the same name of a file")
+    folder.mkdir(parents=True, exist_ok=True)
+    return [write_joint(folder / f"{names[label]}.toml", joint) for label, joint in found.joints.items()]
 
 
 def _by_name(one: JointLevel) -> dict[str, Any]:
@@ -135,9 +170,9 @@ def _of_fits(args: argparse.Namespace) -> tuple[JointLevels, dict[str, Any]]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they are among the findings
         warnings.simplefilter("ignore", ConvergenceWarning)
-        fits = [_fit(args, one) for one in tests]
+        fits = [_fit(args, *each) for each in zip(tests, drives, strict=True)]
         with waiting("motion of the joint"):
-            found = levels(fits, drives, labels=[one.label for one in tests], laws=_chosen(args))
+            found = levels(*zip(*fits, strict=True), labels=[one.label for one in tests], laws=_chosen(args))
     return found, {"sources": [str(one.path) for one in tests], "drives": [asdict(one) for one in drives]}
 
 
@@ -247,8 +282,21 @@ def _drive(args: argparse.Namespace, test: _Test) -> Drive:
         raise ValueError(f"{test.label}: {error}") from error
 
 
-def _fit(args: argparse.Namespace, test: _Test) -> Fit:
-    own = argparse.Namespace(**vars(args) | {"files": [test.path]})
-    measured = measured_assembly(args.model, read_receptances(own), bands=args.band)
+def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Drive]:
+    """Return the fit of a test, and what was held by the names of the fit."""
+    own = argparse.Namespace(**vars(args) | _AS_IDENTIFY | {"files": [test.path]})
+    frfs = read_receptances(own)
+    if args.model is not None:
+        measured = measured_assembly(args.model, frfs, bands=args.band)
+        with waiting(f"fit of {test.path.name}"):
+            return measured.fit(noise=args.noise), drive
+    joint = measured_joint(own, frfs)
+    channels = [str(one) for one in joint.responses.channels]
+    if drive.held == "response" and drive.channel not in channels:
+        hint = did_you_mean(drive.channel, channels)
+        raise UsageError(f"--held {drive.channel}: {test.path.name} has {', '.join(channels)} at the joint{hint}")
     with waiting(f"fit of {test.path.name}"):
-        return measured.fit(noise=args.noise)
+        fit = identify(frfs.freq_hz, joint.h, joint.dofs, args.band, **options_of_compliance(own, frfs, joint, None))
+    if drive.held == "response" and isinstance(fit.data, FitData):
+        drive = replace(drive, channel=fit.data.response_names[channels.index(drive.channel)])
+    return fit, drive

@@ -34,28 +34,28 @@ def _units(dof: str) -> tuple[str, str]:
 
 
 def levels_figure(found: JointLevels, dof: str) -> Figure:
-    """Return stiffness and loss factor of a DOF over amplitude, with intervals and the best law."""
+    """Return stiffness and loss factor of a DOF over motion and force, with intervals and the best law."""
     own, (motion, load) = found.levels[dof], _units(dof)
-    x = np.array([one.amplitude for one in own])
     law = found.laws[dof].fits[0] if dof in found.laws else None
     fitted = {one.amplitude for one in own if one.stiffness.std_error > 0 and one.loss_factor.std_error > 0}
     at = np.array(sorted(fitted))
+    axes = [(f"amplitude, {motion}", np.array([one.amplitude for one in own]), at)]
+    of_law = at if law is None else at * law.stiffness * np.hypot(1.0, law.loss_factor)
+    axes.append((f"force, {load}", np.array([one.force for one in own]), of_law))
     panels = []
-    for name, unit, values, of_law in (
-        ("stiffness", f"{load}/{motion}", [one.stiffness for one in own], None if law is None else law.stiffness),
-        ("loss factor", "1", [one.loss_factor for one in own], None if law is None else law.loss_factor),
-    ):
+    for name, unit in (("stiffness", f"{load}/{motion}"), ("loss factor", "1")):
+        attribute = name.replace(" ", "_")
+        values = [getattr(one, attribute) for one in own]
         low, value, high = (np.array([getattr(one, part) for one in values]) for part in ("low", "value", "high"))
-        percent = f"{100 * found.probability:g} %"
-        curves = [Curve("found", x, value, "ismm-points")]
-        curves += [] if law is None or of_law is None else [Curve(f"law: {law.law}", at, of_law, "actual")]
-        last = name == "loss factor"
-        panels.append(
-            Panel("", f"amplitude, {motion}" if last else "", f"{name}, {unit}", tuple(curves),
-                  (Ribbon(percent, x, low, high, "ismm"),), log_x=True)
-        )  # fmt: skip
-    caption = f"{dof}: stiffness and loss factor over the amplitude of the relative motion, peak values"
-    return Figure(f"levels-{dof}", caption, tuple(panels))
+        for label, x, x_law in axes:
+            order = np.argsort(x)
+            curves = [Curve("found", x[order], value[order], "ismm-points")]
+            curves += [] if law is None else [Curve(f"law: {law.law}", x_law, getattr(law, attribute), "actual")]
+            ribbon = Ribbon(f"{100 * found.probability:g} %", x[order], low[order], high[order], "ismm")
+            below = label if attribute == "loss_factor" else ""
+            panels.append(Panel("", below, f"{name}, {unit}", tuple(curves), (ribbon,), log_x=True))
+    caption = f"{dof}: stiffness and loss factor over the relative motion in the joint and over its force, peak values"
+    return Figure(f"levels-{dof}", caption, tuple(panels), columns=2)
 
 
 def write_levels(found: JointLevels, path: Path | str, *, command: str = "") -> Path:

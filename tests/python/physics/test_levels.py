@@ -15,6 +15,7 @@ import jointfrf as jf
 from harmonic_balance import SECTION, Sliders, iwan_beam
 from jointfrf.amplitude.friction import iwan
 from jointfrf.cli.main import main
+from jointfrf.io import write_frfs
 
 IWAN = (20.0, 1.2e5, -0.4, 0.8)
 FREQ_HZ = np.arange(180.0, 400.5, 2.0)
@@ -133,11 +134,48 @@ def test_frfs_at_the_joint_that_are_bent_by_amplitude_are_refused():
     assert found.findings[0].kind == "bent"
 
 
+def test_the_check_names_resonances_that_move_with_their_motion(believed_beam):
+    own = believed_beam[0]
+    freq = np.arange(215.0, 255.0, 0.5)
+    steady = own.at_force(freq, 1.0)
+    found = jf.check_frfs(freq, jf.pollute(steady.h[:, :, None], 0.01, seed=3), responses=CHANNELS, forces=CHANNELS[:1])
+    (one,) = [each for each in found.findings if each.kind == "bent"]
+    assert one.channels == ("force A/1:y",)
+    moved, times = (float(one.message.split(words)[1].split()[0]) for words in ("moves by", "grows"))
+    ends = steady.joint.max() / np.array([times, 1.0])
+    shift = np.diff([of_mode(own, 1.0, k)[0] for k in own.joint.first_harmonic(ends)])[0]
+    assert 0.5 < moved / shift < 1.5
+    # the same beam with its joint at rest
+    rest = own.at_joint_amplitude(freq, np.full(freq.size, 1e-9)).h[:, :, None]
+    linear = jf.check_frfs(freq, jf.pollute(rest, 0.01, seed=3), responses=CHANNELS, forces=CHANNELS[:1])
+    assert "bent" not in [each.kind for each in linear.findings]
+
+
+def test_two_modes_in_one_peak_are_not_called_bent():
+    freq = np.linspace(0.5, 12, 400)
+    for split in (0.01, 0.02, 0.04, 0.08):
+        h = [
+            sum(size / ((2 * np.pi * f) ** 2 * (1 + 0.03j) - (2 * np.pi * freq) ** 2) for f, size in modes)
+            for modes in (((6, 1), (6 * (1 + split), other)) for other in (1, -0.4, 0.3))
+        ]
+        polluted = jf.pollute(np.stack(h, axis=1)[:, :, None], 0.005, seed=1)
+        assert not jf.check_frfs(freq, polluted, responses=["1:x", "2:x", "3:x"], forces=["1:x"]).findings
+
+
 def test_linear_frfs_at_the_joint_are_not_called_bent():
     freq, h = chains(lambda freq, a, b: np.full(freq.size, 2000 + 100j))
     for seed in range(5):
         fit = jf.identify(freq, jf.pollute(h, 0.03, seed=seed), ["x"], damping="hysteretic")
         assert not jf.levels([fit], [jf.Drive("force", 1.0)]).refused
+
+
+def test_the_loss_factor_is_that_of_both_dampings():
+    freq, h = chains(lambda freq, a, b: 2000 + 100j + 2j * np.pi * freq * 8)
+    fit = jf.identify(freq, jf.pollute(h, 0.003, seed=1), ["x"], damping="both")
+    (one,) = jf.levels([fit], [jf.Drive("joint", 1e-3, "x")], laws=()).levels["x"]
+    at = (one.loss_factor.value * one.stiffness.value - 100) / (2 * np.pi * 8)
+    assert 1 < at < 10  # Hz: the dampers count where they were seen
+    assert one.loss_factor.std_error < 0.02 * one.loss_factor.value
 
 
 @pytest.fixture(scope="module")
@@ -268,6 +306,7 @@ def test_the_command_writes_table_page_and_csv(capsys, tmp_path):
     table.write_text("\n".join([lines[0], *(f"{CASE}/{line}" for line in (lines[5], lines[1]))]) + "\n")
     words = ["levels", "--table", str(table), "--model", str(CASE / "assembly.toml"), "--held", "B/25:y"]
     words += ["--report", str(tmp_path / "page.html"), "--output", str(tmp_path / "out.csv"), "--laws", "power"]
+    words += ["--joints", str(tmp_path / "joints")]
     assert main(words) == 0
     shown = capsys.readouterr().out
     assert shown.index("level_1") < shown.index("level_5")
@@ -277,12 +316,45 @@ def test_the_command_writes_table_page_and_csv(capsys, tmp_path):
     header, *rows = (tmp_path / "out.csv").read_text().splitlines()
     assert header.startswith("dof,test,amplitude")
     assert [row.split(",")[1] for row in rows] == ["level_1", "level_5"]
+    for row in csv.DictReader((tmp_path / "out.csv").read_text().splitlines()):
+        file = tmp_path / "joints" / f"{row['test']}.toml"
+        joint, k = jf.read_joint(file), float(row["k"])
+        assert joint.rigid == ("y",)
+        secant = joint.laws["theta_z", "theta_z"].stiffness(np.ones(1))
+        assert_allclose(secant, k * (1 + 1j * float(row["loss_factor"])))
+        assert main(["export", str(file), "nastran:1,2", "--quiet"]) == 0
+
+
+def test_the_command_needs_no_models_of_frfs_at_the_joint(capsys, tmp_path):
+    for level, k in (("1", 2000 + 100j), ("4", 1800 + 180j)):
+        freq, h = chains(lambda freq, a, b, k=k: np.full(freq.size, k))
+        channels = tuple(jf.io.Channel(node, "+x") for node in (1, 2))
+        measured = jf.pollute(h, 0.01, seed=int(level))
+        write_frfs(tmp_path / f"test_{level}.npz", jf.io.FrfSet(freq, channels, channels, measured, "receptance"))
+    files = [str(tmp_path / f"test_{level}.npz") for level in "14"]
+    joint = ["--j", "1", "--k", "2", "--dofs", "x", "--laws", "power"]
+    assert main(["levels", *files, "--level", "1e-4,4e-4", "--held", "joint:x", "--json", *joint]) == 0
+    low, high = json.loads(capsys.readouterr().out)["levels"]["x"]
+    for one, level, k in ((low, 1e-4, 2000 + 100j), (high, 4e-4, 1800 + 180j)):
+        assert_allclose(one["amplitude"], level)
+        assert one["stiffness"]["low"] < k.real < one["stiffness"]["high"]
+        assert one["loss_factor"]["low"] < k.imag / k.real < one["loss_factor"]["high"]
+        assert one["loss_factor"]["std_error"] < 0.1 * k.imag / k.real
+    # a channel by its name in the file; the joint moves by its difference from the other one
+    assert main(["levels", files[0], "--level", "1e-4", "--held", "2:+x", "--json", *joint]) == 0
+    (one,) = json.loads(capsys.readouterr().out)["levels"]["x"]
+    h = chains(lambda freq, a, b: np.full(freq.size, 2000 + 100j))[1]
+    across = abs((h[:, 0] - h[:, 1]) / h[:, 1]) * 1e-4
+    assert across.min() < one["lowest"] <= one["amplitude"] <= one["highest"] < across.max()
+    assert main(["levels", files[0], "--level", "1e-4", "--held", "3:+x", *joint]) == 2
+    assert "test_1.npz has 1:+x, 2:+x at the joint" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
     ("words", "status", "text"),
     [
         (["a.uff"], 2, "--model is missing"),
+        (["--backbone", "b.csv", "--j", "1"], 2, "a backbone needs it"),
         (["a.uff", "--model", "m.toml"], 2, "--level must name 1 levels"),
         (["--model", "m.toml"], 2, "name the files"),
         (["a.uff", "--model", "m.toml", "--table", "t.csv"], 2, "leave out those"),
