@@ -1,9 +1,9 @@
 """k(a) and eta(a) of a beam with an Iwan joint, simulated by harmonic balance: how often their intervals hold.
 
-Prints the tables of docs/accuracy.md. Eight levels of a stepped sine at one drive point, four responses, 180 to 400 Hz
-in steps of 2 Hz about the first bending mode, 1 % noise. Of both halves Young's moduli are believed to 1 %, the loss
-factor, 0.001, to 50 %: draw i is of a beam of its own, of these drawn so (seed [7, i]). The noise of draw i of level l,
-both from 0, has the seed 1000 l + i.
+Prints the tables of docs/accuracy.md and, of the check, docs/checks.md. Eight levels of a stepped sine at one drive
+point, four responses, 180 to 400 Hz in steps of 2 Hz about the first bending mode, 1 % noise. Of both halves Young's
+moduli are believed to 1 %, the loss factor, 0.001, to 50 %: draw i is of a beam of its own, of these drawn so (seed [7,
+i]). The noise of draw i of level l, both from 0, has the seed 1000 l + i.
 
 amplitude [CONTROL...] [--draws N] [--levels NUMBER...]: joint (its relative rotation is held), response (the free end
 of B), force; alarms: linear tests that are called bent (draw i has the seed i); check: what `jf.check_frfs` calls bent,

@@ -792,8 +792,9 @@ def _setups(errors: SetUpErrors) -> list[Finding]:
         low, high = one.band
         text = f"set-up {one.name} disagrees with the others: {what} off their mean at {low:.4g} to {high:.4g} Hz"
         is_large = one.change > _USUAL_GAIN
-        if one.part == "resonances" and is_large:
-            text += "; set-ups of different structures, by masses of sensors or temperature: intervals hold less often"
+        if one.part == "resonances":
+            text += "; set-ups of different structures, by masses of sensors or temperature: intervals of few set-ups "
+            text += "hold less often"
         severity: Literal["warning", "note"] = "warning" if is_large or errors.exceeds else "note"
         found.append(Finding("calibration", severity, text, (one.name,), (one.band,)))
     gain, phase = np.sqrt(errors.variance.sum(axis=1)).tolist()

@@ -178,6 +178,15 @@ def test_a_setup_whose_resonances_are_lower_is_named(assembly, h):
     assert {one.part for one in calibration_errors(FREQ, apart, setups).setups.deviations} == {"gain"}
 
 
+def test_resonances_that_differ_little_are_said_to_cost_coverage(assembly, h):
+    warm = assembly.receptance(FREQ / 0.9999, ENDS, ENDS)
+    setups = jf.SetUps(["cold", "warm"], SIDES)
+    fit = jf.identify(FREQ, noisy(np.where(setups.of == 0, h, warm), 10), ["y", "theta"], setups=setups)
+    (one,) = [one for one in fit.findings if one.about == ("warm",) and "resonances" in one.text]
+    assert one.severity == "note"
+    assert "intervals of few set-ups hold less often" in one.text
+
+
 def test_repeats_alone_show_what_setups_differ_by(h):
     """FRFs that are not square: only what was measured in both set-ups compares them."""
     rows = noisy(h * np.array([1.0, 1.0, 1.02, 1.02]), 4)[:, :2]
