@@ -7,6 +7,9 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 ROOT = DOCS.parent
 sys.path[:0] = [str(DOCS)]
+# Python executes the .pth files of a virtual environment twice. Of two equal finders of an editable installation each
+# forgets, for the other's sake, that it has run ninja, and runs it again for every name that is not a module.
+sys.meta_path[:] = list({repr(finder): finder for finder in sys.meta_path[::-1]}.values())[::-1]
 
 from site_pages import escape_docstring, write_pages  # noqa: E402
 
