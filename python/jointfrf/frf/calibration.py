@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -248,20 +248,25 @@ def calibration_errors(
         return _as_said(span, setups)
     factors = _factors(differences, _functions(span, 2 * n_slow, freq.tobytes()), _mixture(span))
     by_noise = _squares(factors, 1 / factors.variance, differences)
-    # Errors far above the noise count alike, however small the noise of a pair is.
-    alike = _squares(factors, np.ones((len(factors.value), 1, 1)), differences)
     found = np.zeros((2, 3, 2, n_slow))  # variance and degrees; set-up, channel and own; gain and phase
     reference = by_noise[..., n_slow:].sum(axis=3)
     # Functions 0, 1, 2 to 3, 4 to 7 are about as fast.
     first = [one for one in (0, 1, 2, 4) if one < n_slow]
-    tested, sized = (np.add.reduceat(squares[..., :n_slow], first, axis=3) for squares in (by_noise, alike))
+    tested = np.add.reduceat(by_noise[..., :n_slow], first, axis=3)
+
+    @cache
+    def sized() -> FloatArray:
+        # Errors far above the noise count alike, however small the noise of a pair is.
+        alike = _squares(factors, np.ones((len(factors.value), 1, 1)), differences)
+        return np.asarray(np.add.reduceat(alike[..., :n_slow], first, axis=3))
+
     said = None if setups is None else setups.gain
     exceeds = False
     for part in range(2):
         for i, own in enumerate(map(slice, first, [*first[1:], n_slow])):
             variance_and_degrees = _variances(
-                tested[:, :, part, i], sized[:, :, part, i], reference[:, :, part], said if i == part == 0 else None,
-                always=i == 0,
+                tested[:, :, part, i], sized, (part, i), reference[:, :, part],
+                said if i == part == 0 else None, always=i == 0,
             )  # fmt: skip
             found[:, :, part, own] = variance_and_degrees[:, :, None]
             if i == part == 0 and said is not None:
@@ -364,7 +369,8 @@ def _differences(h: ComplexArray, setups: SetUps | None, *, reciprocal: bool) ->
     """Return the differences that there are; None where there are none."""
     both = reciprocity_differences(h, entry_groups(h, reciprocal=True)) if reciprocal else None
     if setups is None:
-        return None if both is None else _of_directions(h, both, both.variance_of_parts(near_squares(h)))
+        near = near_squares(h)
+        return None if both is None else _of_directions(h, both, both.variance_of_parts(near, medians(near.T).T))
     empty = np.zeros(0, np.intp)
     rows, columns = (empty, empty) if both is None else (both.rows, both.columns)
     one, other, n_ways = h[:, rows, columns], h[:, columns, rows], len(rows)
@@ -487,12 +493,19 @@ def _beside(columns: FloatArray, taken: FloatArray) -> FloatArray:
 
 
 def _variances(
-    tested: FloatArray, sized: FloatArray, reference: FloatArray, said: float | None, *, always: bool
+    tested: FloatArray,
+    all_sized: Callable[[], FloatArray],
+    at: tuple[int, int],
+    reference: FloatArray,
+    said: float | None,
+    *,
+    always: bool,
 ) -> FloatArray:
     """Return variance and degrees of freedom of set-ups, channels and FRFs, shape (2, 3), by sums of `_squares`.
 
-    By the first sums it is tested whether they exceed those of noise, the third; the second ones give the size. Set-ups
-    have the variance that was said, unless they exceed it; where none was said, `always` takes what they have.
+    By the first sums it is tested whether they exceed those of noise; those of all parts and functions, which are asked
+    for only where they do, give the size. Set-ups have the variance that was said, unless they exceed it; where none
+    was said, `always` takes what they have.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         noise = np.where(reference[:, 1] > 0, reference[:, 0] / reference[:, 2], 0)
@@ -505,9 +518,10 @@ def _variances(
         if degrees == 0 or expected <= 0:
             continue
         is_more = special.fdtrc(degrees, degrees_noise[kind], tested[kind, 0] / expected) < _CHANCE
-        if kind == 0 and always and said is None and sized[0, 3] > 0:
+        if kind == 0 and always and said is None and (sized := all_sized()[:, :, *at])[0, 3] > 0:
             found[:, 0] = sized[0, 0] / sized[0, 3], degrees
         elif is_more:
+            sized = all_sized()[:, :, *at]
             found[0, kind] = 0
             expected = noise[kind] * sized[kind, 2] + found[0] @ sized[kind, 3:]
             if sized[kind, 0] > expected:

@@ -270,10 +270,15 @@ class _NoisyLines:
         return near_squares(self.h)
 
     @cached_property
+    def usual(self) -> FloatArray:
+        """Medians of `near` over the lines, shape (n_out, n_in)."""
+        return medians(self.near.T).T
+
+    @cached_property
     def variance_of_differences(self) -> FloatArray:
         """Variance of all entries by the parts of the differences."""
         assert self.differences is not None
-        return self.differences.variance_of_parts(self.near)
+        return self.differences.variance_of_parts(self.near, self.usual)
 
     def smoothed(
         self, variance: FloatArray, inflation: float | None, patience: int, start: tuple[ComplexArray, ...] = ()
@@ -289,7 +294,7 @@ class _NoisyLines:
 
     @cached_property
     def _least(self) -> FloatArray:
-        return np.maximum(_ROUNDING**2 * first_variance(self.near), TINY)
+        return np.maximum(_ROUNDING**2 * first_variance(self.near, self.usual), TINY)
 
 
 def _estimated(
@@ -372,7 +377,7 @@ def _first_smooth(
     """Return smooth FRFs by weights from differences where there are any, these variances, and the inflation."""
     inflation = None
     if differences is None:
-        variance = first_variance(lines.near)
+        variance = first_variance(lines.near, lines.usual)
     else:
         variance = lines.weighing(lines.variance_of_differences)
         inflation = differences.inflation(variance, differences.line_levels(variance).factor)

@@ -241,7 +241,8 @@ def _smooth_group(
         mean, spread = group.means(h, variance)
         entries = Entries(s, mean, 1 / np.sqrt(spread))
         return entries, search_order(entries, search, start)
-    mean, spread = group.means(h, first_variance(near_squares(h)))
+    near = near_squares(h)
+    mean, spread = group.means(h, first_variance(near, medians(near.T).T))
     fit = search_order(Entries(s, mean, 1 / np.sqrt(spread)), search, start)
     count = np.where(group.repeated, 2, 1)[:, None]
     weight = np.sqrt(count / ((3 * abs(fit.smooth) ** 2 + count * spread) / 4))
@@ -249,9 +250,9 @@ def _smooth_group(
     return entries, search_order(entries, search, fit.poles)
 
 
-def first_variance(near: FloatArray) -> FloatArray:
-    """Variance before anything is known of the noise: |h|^2 over neighbouring lines, not below a part of its median."""
-    return np.maximum(near + _FIRST_FLOOR * medians(near.T).T, TINY)
+def first_variance(near: FloatArray, usual: FloatArray) -> FloatArray:
+    """Variance before anything is known of the noise: |h|^2 over neighbouring lines, and a part of its median."""
+    return np.maximum(near + _FIRST_FLOOR * usual, TINY)
 
 
 def near_squares(h: ComplexArray) -> FloatArray:

@@ -6,7 +6,7 @@ import pytest
 from jointfrf.frf.quantiles import medians, quantiles
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 10, 41])
+@pytest.mark.parametrize("n", [1, 2, 3, 10, 41, 100, 101])
 def test_medians_are_those_of_numpy(n):
     values = np.random.default_rng(n).standard_normal((3, 5, n))
     np.testing.assert_array_equal(medians(values), np.median(values, axis=-1))

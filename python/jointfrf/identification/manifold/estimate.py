@@ -395,13 +395,16 @@ def assembled(parameters: Sequence[NamedParameter], groups: Sequence[GroupFit]) 
     kept = np.sort(np.concatenate([group.which for group in groups]))
     place = np.full(p, -1)
     place[kept] = np.arange(kept.size)
+    # A group with other numbers is another object, of which everything would be computed again.
+    if kept.size < p:
+        groups = [replace(group, problem=group.problem._replace(which=place[group.which])) for group in groups]
     equations = sum(group.equations for group in groups)
     degrees = max(equations - kept.size / 2, 1)
     return JointEstimate(
         tuple(parameters[i] for i in kept),
         theta[kept],
         covariance[kept[:, None], kept],
-        tuple(replace(group, problem=group.problem._replace(which=place[group.which])) for group in groups),
+        tuple(groups),
         sum(group.noise_squares for group in groups) / degrees,
         sum(group.cost for group in groups) / degrees,
         equations,

@@ -168,8 +168,10 @@ class GroupFit(FormMinimum):
 
     @classmethod
     def of(cls, minimum: FormMinimum, **more: Any) -> GroupFit:
-        """Return a minimum with what belongs to it."""
-        return cls(**{one.name: getattr(minimum, one.name) for one in fields(FormMinimum)}, **more)
+        """Return a minimum with what belongs to it, and what was computed of it."""
+        found = cls(**{one.name: getattr(minimum, one.name) for one in fields(FormMinimum)}, **more)
+        vars(found).update(vars(minimum))
+        return found
 
     @property
     def dofs(self) -> NDArray[np.intp]:
