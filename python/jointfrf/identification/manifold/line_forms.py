@@ -54,8 +54,14 @@ class LineForms(NamedTuple):
     squares: FloatArray
 
     def on_slice(self, lines: slice) -> LineForms:
-        """Return neighbouring lines, without a copy."""
-        return LineForms(self.compliance[lines], self.weight[lines], self.gradient[lines], self.squares[lines])
+        """Return some of the lines; neighbouring ones without a copy."""
+        kept = np.ascontiguousarray
+        return LineForms(
+            kept(self.compliance[lines]),
+            kept(self.weight[lines]),
+            kept(self.gradient[lines]),
+            kept(self.squares[lines]),
+        )
 
     def scaled(self, line_weight: FloatArray) -> LineForms:
         """Return the same with each line weighted."""

@@ -23,6 +23,8 @@ _SMOOTH = 0.2
 _PIECE = 1024
 #: Squares of a start are minimised to this.
 _ROUGH = 0.1
+#: Of many lines about so many, evenly spread, give the starts, and show which is better.
+_SOME_LINES = 150
 #: Lines count less from this relative noise of gamma_jk on.
 _HIDDEN = 0.1
 
@@ -110,20 +112,25 @@ def _coupled_starts(
     n = joint.n
     a, b = joint.rows, joint.columns
     size = np.sqrt(np.maximum(np.einsum("lqq->lq", covariance).real, np.finfo(float).tiny))
-    scaled = covariance / (size[:, :, None] * size[:, None, :])
+    outer = size[:, :, None] * size[:, None, :]
     q = n * n
-    weight = invert(scaled + 1e-10 * np.eye(q), on_singular="nan") / (size[:, :, None] * size[:, None, :])
+    weight = invert(covariance / outer + 1e-10 * np.eye(q), on_singular="nan")
+    weight /= outer
     fold = np.zeros((q, a.size))
     fold[a * n + b, np.arange(a.size)] = 1
     fold[b * n + a, np.arange(a.size)] = 1
     weight = (fold.T @ weight @ fold) * line_weight[:, None, None]
     mean = ((value + value.swapaxes(1, 2)) / 2)[:, a, b]
     forms = LineForms(mean, weight, np.zeros_like(mean), np.zeros(len(mean)))
-    starts = [_linear_start(value, own, line_weight, joint), _mean_start(value, own, line_weight, joint)]
-    starts = [start for start in starts if np.isfinite(start).all()]
-    found = (joint.minimise(forms, start, least_gain=_ROUGH) for start in starts)
-    minima = sorted(found, key=lambda one: one.cost)
-    return [found.x for found in minima] + starts
+    some = slice(None, None, max(1, len(mean) // _SOME_LINES))
+    few, of_few = joint.on_lines(some), forms.on_slice(some)
+    linear = _linear_start(value[some], own[some], line_weight[some], few)
+    starts = [start for start in (linear, _mean_start(value, own, line_weight, joint)) if np.isfinite(start).all()]
+    minima = sorted((few.minimise(of_few, start, least_gain=_ROUGH) for start in starts), key=lambda one: one.cost)
+    found = [one.x for one in minima]
+    if some.step > 1 and found:
+        found[0] = joint.minimise(forms, found[0], least_gain=_ROUGH).x
+    return found + starts
 
 
 def _mean_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: SpringJoint) -> FloatArray:
