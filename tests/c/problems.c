@@ -5,13 +5,16 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Kinds of noise, by their letters. */
+static const char noises[] = "CPNUS";
+
 int variants(int routine)
 {
     switch (routine) {
     case RECEPTANCE: case RECEPTANCE_BANDED: case DECOUPLE: case PROJECT_ON_JOINT: case JOINT_FORMS:
     case EXPECT_ON_JOINT: return 4;
     case COMPLIANCE_COVARIANCE: case FIT_DIAGONAL_JOINT: return 2;
-    case POLLUTE: return 5;
+    case POLLUTE: return sizeof noises - 1;
     case MONTE_CARLO: case BRICK_MATRICES: return 3;
     default: return 1;
     }
@@ -236,7 +239,7 @@ problem new_problem(int routine, char trans, int n, int n_freq, int variant)
                                                  : 2 * (size_t)p.size[4] * (size_t)(p.size[4] + 1);
         break;
     case POLLUTE:
-        p.letters[0] = "CPNUS"[variant];
+        p.letters[0] = noises[variant];
         p.letters[1] = "ELS"[variant % 3];
         lines(&p, 0, n, n, &state);
         p.out_line = 2 * (size_t)n * (size_t)n * REALISATIONS;
