@@ -6,6 +6,7 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
 
 from jointfrf.frf.noise_model import estimate_noise
 from jointfrf.joint import Joint
@@ -30,7 +31,7 @@ from jointfrf.kernel.call import N_FREQ, OnSingular, run
 from jointfrf.kernel.linear_algebra import solve
 from jointfrf.laws.law_joint import Connection, LawJoint
 
-__all__ = ["connect", "connection_forces", "couple", "semm", "semm_standard_error"]
+__all__ = ["connect", "connection_forces", "couple", "motions_across", "semm", "semm_standard_error"]
 
 SemmMethod = Literal["original", "extended"]
 
@@ -59,13 +60,26 @@ def connection_forces(
     return solve(left / size, link.t / size, freq_hz=freq_hz, on_singular=on_singular)
 
 
+def motions_across(h: ComplexArray, pattern: FloatArray) -> ComplexArray:
+    """Return H E, shape (n_freq, n, q), of H of shape (n_freq, n, m).
+
+    Notes
+    -----
+    A column of E has an entry or two: with many connections a dense product takes ten times as long.
+    """
+    sparse_columns = sparse.csr_array(pattern)
+    return np.asarray(h.reshape(-1, h.shape[2]) @ sparse_columns).reshape(*h.shape[:2], pattern.shape[1])
+
+
 def connect(
     h: ComplexArray, link: Connection, freq_hz: FloatArray | None = None, on_singular: OnSingular = "raise"
 ) -> ComplexArray:
     """Return the receptances with the connections, shape (n_freq, m, m)."""
-    e = link.pattern
-    w = connection_forces(e.T @ h @ e, link, freq_hz, on_singular)
-    return np.ascontiguousarray(h - (h @ e) @ w @ (e.T @ h))
+    to_out = motions_across(h, link.pattern)
+    to_in = motions_across(h.swapaxes(1, 2), link.pattern).swapaxes(1, 2)
+    between = motions_across(to_in, link.pattern)
+    w = connection_forces(between, link, freq_hz, on_singular)
+    return np.ascontiguousarray(h - to_out @ w @ to_in)
 
 
 def couple(

@@ -4,6 +4,7 @@ import csv
 import importlib.util
 import json
 import re
+import runpy
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -254,3 +255,34 @@ def test_a_sensor_that_points_the_other_way_is_named(tmp_path):
 
 def test_looking_for_exchanged_channels_needs_models():
     assert "--find-wrong-channels is for tests with --model" in run(*BARS, "--find-wrong-channels", expect=2).stderr
+
+
+@pytest.mark.filterwarnings("ignore:.*poorly determined:jointfrf.errors.IdentificationWarning")
+@pytest.mark.parametrize("case", ["four-mounts", "four-floors"])
+def test_pages_of_cases_with_several_joints_show_what_is_found_beside_the_truth(case):
+    folder = CASES / case
+    own = runpy.run_path(str(folder / "make.py"))
+    if case == "four-mounts":
+        true = {
+            f"{mount}.k_{way}": k for mount, ks in own["mounts"](1).items() for way, k in zip("xyz", ks, strict=True)
+        }
+        true |= {f"mounts.k_{way}": k for way, k in zip("xyz", own["STIFFNESS"], strict=True)}
+        true |= {f"{rail}/youngs_modulus": modulus for rail, modulus in own["YOUNGS_MODULUS"].items()}
+        true["machine/density"] = own["MASS"] / own["KEYS"]["parts"]["machine"]["mass"]
+    else:
+        k = own["STIFFNESS"]
+        true = {"f1c1.k_theta_z": k, "f1c1.h_theta_z": own["LOSS_FACTOR"] * k}
+        true["column1/youngs_modulus"] = own["YOUNGS_MODULUS"]
+    (command,) = [line for line in (folder / "README.md").read_text().splitlines() if line.startswith("jointfrf")]
+    file, model = (CASES.parent / command.split()[place] for place in (2, 4))
+    fit = jf.measured_assembly(model, read_frfs(file)).fit()  # as the command does
+    assert fit.residual_is_noise
+    rows = [line.strip("| ").split(" | ") for line in (folder / "README.md").read_text().splitlines() if "|" in line]
+    shown = {name: (float(a), float(b), tuple(map(float, interval.split(" .. ")))) for name, a, b, interval in rows[2:]}
+    assert shown.keys() == true.keys()
+    intervals = fit.confidence_interval(0.95)
+    for name, (stated, value, interval) in shown.items():
+        found, size = [fit.value[name], *intervals[name]], fit.std_error[name]
+        assert stated == pytest.approx(true[name], rel=1e-4)
+        assert [value, *interval] == pytest.approx(found, abs=0.1 * size + 1e-4 * value)
+        assert found[1] < true[name] < found[2]

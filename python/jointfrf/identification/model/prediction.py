@@ -29,7 +29,7 @@ from jointfrf.identification.parameters import (
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.laws.law_joint import Connection
-from jointfrf.substructuring.coupling import connect, connection_forces
+from jointfrf.substructuring.coupling import connect, connection_forces, motions_across
 
 __all__ = ["Prediction", "parameter_vector"]
 
@@ -259,9 +259,13 @@ class Prediction:
         """Return the FRFs before the substructures are connected; those of the same states are kept."""
         if self._last is None or any(one is not other for one, other in zip(self._last[0], states, strict=True)):
             h, e = _together(states), link.pattern
-            to_out, to_in = h[:, self.responses] @ e, e.T @ h[:, :, self.forces]
+            to_out = motions_across(h[:, self.responses], e)
+            to_in, to_connections = (
+                np.ascontiguousarray(motions_across(own.swapaxes(1, 2), e).swapaxes(1, 2))
+                for own in (h[:, :, self.forces], h)
+            )
             free = np.ascontiguousarray(h[:, self.responses][:, :, self.forces])
-            self._last = states, _Open(h, free, to_out, to_in, e.T @ h @ e)
+            self._last = states, _Open(h, free, to_out, to_in, motions_across(to_connections, e))
         return self._last[1]
 
     def _coupled(self, link: Connection, states: tuple[SubstructureState, ...]) -> _Coupled:
