@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, cast, get_args
 
@@ -12,6 +12,7 @@ import numpy as np
 from jointfrf.cli.measured_file import nodes, numbers, point, words
 from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import Output, UsageError, check_folder, positive, warn_of_ignored
+from jointfrf.dofs import point_and_direction
 from jointfrf.files import write_file
 from jointfrf.identification.fit_cards import cards
 from jointfrf.identification.joint_file import JointFile, read_joint_file
@@ -53,7 +54,8 @@ def add_arguments(parser: CommandParser) -> None:
         "export",
         type=parse_export,
         metavar="PROGRAM:J,K",
-        help="program and nodes j and k of its model: nastran:9001,9002; calculix: two ROT NODEs more for rotations",
+        help="program and nodes j and k of its model: nastran:9001,9002; calculix: two ROT NODEs more for rotations; "
+        "of several joints nastran:fl=9001,9002:fr=9003,9004",
     )
     parser.option(
         "--frequency HZ",
@@ -92,7 +94,9 @@ def _table_lines(joint: Joint | LawJoint, low: float, high: float) -> FloatArray
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
-    found = _at_point(read_joint_file(args.joint), args.point)
+    found = read_joint_file(args.joint)
+    if args.point is not None or not isinstance(args.export[1], dict):
+        found = _at_point(found, args.point)
     at = args.frequency if isinstance(args.frequency, float) else None
     if isinstance(found.joint, Joint) and at is not None:
         warn_of_ignored(args, ("--frequency",), "no law of this joint depends on frequency")
@@ -119,6 +123,8 @@ def run(args: argparse.Namespace) -> int:
 def _by_hand(found: JointFile, request: CardRequest, freq_hz: float | None) -> str:
     """Return the cards of a joint that was written by hand."""
     options: CardOptions = {**request.options, "comments": found.about}
+    if isinstance(request.nodes, dict):
+        raise UsageError("nodes by names of joints are for a saved fit of several joints")
     try:
         if isinstance(found.joint, LawJoint):
             return found.joint.export(request.program, request.nodes, freq_hz=freq_hz, **options)
@@ -137,7 +143,7 @@ def _at_point(found: JointFile, point: str | None) -> JointFile:
     if found.fit is None or point not in known:
         raise UsageError(
             f"--point must name one joint point of the file, {', '.join(known) or 'which has none'}"
-            + ("" if point is None else f", not {point!r}")
+            + (f", not {point!r}" if point is not None else ", or PROGRAM:NAME=J,K:... the nodes of all")
         )
     fit = found.fit.at_point(point)
     return found._replace(fit=fit, joint=fit.joint, about=(*found.about, f"joint point {point}"))
@@ -185,14 +191,18 @@ def _points(args: argparse.Namespace, found: JointFile) -> FloatArray | None:
     return found.points
 
 
+#: Nodes j and k of a joint, and ROT NODEs of CalculiX; of several joints by their names.
+CardNodes = list[int] | dict[str, list[int]]
+
+
 class CardRequest(NamedTuple):
     """What is to be written, and where.
 
     Attributes
     ----------
     program : str
-    nodes : list of int
-        j and k.
+    nodes : list of int, or dict of these
+        j and k; of several joints by their names, with ROT NODEs of CalculiX.
     options : CardOptions
     all_damping, bounds : bool
     output : Path or None
@@ -200,27 +210,41 @@ class CardRequest(NamedTuple):
     """
 
     program: CardFormat
-    nodes: list[int]
+    nodes: CardNodes
     options: CardOptions
     all_damping: bool
     bounds: bool
     output: Path | None
 
 
-def parse_export(text: str) -> tuple[CardFormat, list[int]]:
-    """Return program and nodes of words like abaqus:9001,9002."""
+def parse_export(text: str) -> tuple[CardFormat, CardNodes]:
+    """Return program and nodes of words like abaqus:9001,9002, or abaqus:fl=9001,9002:fr=9003,9004."""
     program, _, rest = text.partition(":")
     known = get_args(CardFormat)
     if program not in known:
         raise argparse.ArgumentTypeError(f"{program!r} is none of {', '.join(known)}{did_you_mean(program, known)}")
+    if "=" not in rest:
+        return cast(CardFormat, program), _ends(text, program, rest)
+    of_joints: dict[str, list[int]] = {}
+    for part in rest.split(":"):
+        name, _, own = part.partition("=")
+        if not name or name in of_joints:
+            raise argparse.ArgumentTypeError(f"{text!r} names {name or 'no joint'} {'twice' if name else f'of {own}'}")
+        of_joints[name] = _ends(text, program, own)
+    return cast(CardFormat, program), of_joints
+
+
+def _ends(text: str, program: str, rest: str) -> list[int]:
+    """Return the nodes of one joint."""
     ends = list(nodes(rest).numbers) if rest else []
     if 0 < len(ends) < len(words(rest)):
         raise argparse.ArgumentTypeError(f"{text!r} names a node twice")
     if len(ends) not in (2, 4 if program == "calculix" else 2):
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not a program and nodes j and k like abaqus:9001,9002; calculix takes two ROT NODEs more"
+            f"{text!r} is not a program and nodes j and k like abaqus:9001,9002, of several joints "
+            "abaqus:fl=9001,9002:fr=9003,9004; calculix takes two ROT NODEs more"
         )
-    return cast(CardFormat, program), ends
+    return ends
 
 
 def _faces(text: str) -> tuple[list[int], list[int]]:
@@ -294,10 +318,12 @@ def card_request(
         return None
     check_folder("--output", args.output)
     program, ends = args.export
+    of_joints = ends if isinstance(ends, dict) else {}
+    _check_joints(args, dofs, of_joints)
     options: CardOptions = {
         "element": args.element,
         "number": args.property,
-        "rotation_nodes": ends[2:] or None,
+        "rotation_nodes": None if of_joints else ends[2:] or None,
         "damping": not args.no_damping and program != "calculix",  # it has none between DOFs; the text says so
         "full_matrix": args.full_matrix,
         "connector": args.connector,
@@ -308,17 +334,34 @@ def card_request(
         options["positions"] = np.array(args.nodes_at)
         if points is not None:
             options["points"] = points / model_units(args.units or "SI").length
-    request = CardRequest(program, ends[:2], options, args.all_damping, args.bounds, args.output)
+    request = CardRequest(program, of_joints or ends[:2], options, args.all_damping, args.bounds, args.output)
     try:
-        _probe(len(dofs), dofs, damping, cross).export(request.program, request.nodes, **options)
+        for name, own in (of_joints or {"": ends}).items():
+            held = [dof for point, dof in map(point_and_direction, dofs) if point == name]
+            whole: CardOptions = {**options, "rotation_nodes": own[2:] or None}
+            _probe(len(held), held, damping, cross).export(program, own[:2], **whole)
     except ValueError as error:
         raise UsageError(_refusal(str(error), damping)) from error
     return request
 
 
+def _check_joints(args: argparse.Namespace, dofs: Sequence[str], of_joints: Mapping[str, list[int]]) -> None:
+    """Raise an error unless each joint has its nodes, and only these."""
+    known = list(dict.fromkeys(point for point, _ in map(point_and_direction, dofs)))
+    if sorted(of_joints) != sorted(known) and (of_joints or len(known) > 1):
+        example = ":".join(f"{name}={9001 + 2 * i},{9002 + 2 * i}" for i, name in enumerate(known) if name)
+        raise UsageError(
+            f"--export must name the nodes of each joint, {', '.join(filter(None, known)) or 'one without a name'}"
+            + (f": {args.export[0]}:{example}" if example else f", such as {args.export[0]}:9001,9002")
+        )
+    for name, given in (("--nodes-at", args.nodes_at), ("--faces", args.faces)):
+        if of_joints and given is not None:
+            raise UsageError(f"{name} is of one joint: --save, then jointfrf export FILE PROGRAM:J,K --point NAME")
+
+
 def _probe(n: int, dofs: Sequence[str], damping: str, cross: str) -> Joint:
     """Return a joint with every term that the one to be found may have."""
-    matrix = np.eye(n) + (0.1 if cross == "fit" else 0.0) * (1 - np.eye(n))
+    matrix = np.eye(n) + (0.1 if cross in ("fit", "points") else 0.0) * (1 - np.eye(n))
     viscous = matrix if damping in ("viscous", "both", "auto") else None
     hysteretic = matrix if damping in ("hysteretic", "both", "auto") else None
     return Joint(matrix, viscous, dofs, structural_damping=hysteretic)

@@ -124,7 +124,8 @@ def add_arguments(parser: CommandParser) -> None:
     parser.option(
         "--export PROGRAM:J,K",
         "the joint (by the first method) as input of abaqus, calculix (stiffness only), nastran or ansys, between "
-        "its nodes J and K: abaqus:9001,9002; rotations of calculix need two ROT NODEs after them",
+        "its nodes J and K: abaqus:9001,9002; rotations of calculix need two ROT NODEs after them; of several joints "
+        "abaqus:fl=9001,9002:fr=9003,9004",
         parse_export,
     )
     add_card_arguments(parser)
@@ -200,7 +201,7 @@ def run(args: argparse.Namespace) -> int:
         out.say("", text.rstrip("\n"))
     if args.report is not None:
         fit = fits[args.method.index("compliance")]
-        ends = (1, 2) if args.export is None else args.export[1]
+        ends = (1, 2) if args.export is None or isinstance(args.export[1], dict) else args.export[1]
         args.report.parent.mkdir(parents=True, exist_ok=True)
         written.append(write_report(fit, args.report, source=file_names(args), command=args.typed, nodes=ends,
                                     space=args.space))  # fmt: skip
@@ -214,7 +215,6 @@ def run(args: argparse.Namespace) -> int:
 def _check_points(args: argparse.Namespace) -> None:
     """Raise an error for options that are of one joint point."""
     for name, value, instead in (
-        ("--export", args.export, "say --save FILE, then jointfrf export FILE PROGRAM:J,K --point NAME"),
         ("--side-j", args.side_j, "models of the sides correct the FRFs of one joint point"),
         ("--side-k", args.side_k, "models of the sides correct the FRFs of one joint point"),
     ):

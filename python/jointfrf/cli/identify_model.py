@@ -169,7 +169,7 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
         write_record(args.save, fit_to_dict(fit, lines=args.save_lines) | {"source": source})
         written.append(args.save)
     if args.report is not None:
-        ends = (1, 2) if args.export is None else args.export[1]
+        ends = (1, 2) if args.export is None or isinstance(args.export[1], dict) else args.export[1]
         args.report.parent.mkdir(parents=True, exist_ok=True)
         written.append(write_report(fit, args.report, source=source, command=args.typed, nodes=ends,
                                     parts=measured.sketched, space=args.space))  # fmt: skip
@@ -188,11 +188,11 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
 
 def _request(args: argparse.Namespace, measured: MeasuredAssembly) -> CardRequest | None:
     joint = measured.assembly.joint
-    if args.export is not None and len(measured.assembly.joints) > 1:
-        raise UsageError("--export writes one joint, and there are several: --save, then jf.cards of fit.at_point(...)")
-    if args.export is not None and args.faces is None:
+    is_one = "" in measured.assembly.joints
+    if args.export is not None and args.faces is None and is_one:
         args.faces = _rigid_faces(measured)
-    return card_request(args, joint.dofs, damping="none", cross="zero", points=_joint_places(measured))
+    return card_request(args, joint.dofs, damping="none", cross="zero",
+                        points=_joint_places(measured) if is_one else None)  # fmt: skip
 
 
 def _rigid_faces(measured: MeasuredAssembly) -> tuple[list[int], list[int]] | None:
@@ -220,6 +220,9 @@ def _place_of_joint(measured: MeasuredAssembly, request: CardRequest) -> list[st
               if (patch := part.joint_patch) is not None and patch.coupling == "distributing"]  # fmt: skip
     said = [f"{' and '.join(spread)}: the joint acts on the mean motion of the nodes: connect its node to them by a "
             "distributing coupling (RBE3), which adds no stiffness"] if spread else []  # fmt: skip
+    if isinstance(request.nodes, dict):
+        grounded = [name for name, one in measured.assembly.joints.items() if not one.k]
+        return [*said, *([f"side k of {', '.join(grounded)} is the ground: hold node k"] if grounded else [])]
     places = _joint_places(measured)
     if places is None or "positions" in request.options:
         return said

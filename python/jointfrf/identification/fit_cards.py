@@ -104,6 +104,7 @@ def _cards_of_points(
     if given:
         raise ValueError(f"{given[0]} is of one joint point: write the cards of each, fit.at_point")
     element, number = options.get("element", 1), options.get("number", 1)
+    sets: list[int] = []
     for point in fit.points:
         ends = nodes[point]
         own: CardOptions = {**options, "element": element, "number": number, "rotation_nodes": ends[2:] or None}
@@ -113,7 +114,13 @@ def _cards_of_points(
         )  # fmt: skip
         # Beyond every element and property that these lines name.
         element, number = element + len(text.splitlines()), number + len(text.splitlines())
+        sets += [own["number"]] if "\nMPC*" in text else []
         yield text
+    if len(sets) > 1:  # a run of Nastran takes one set of equations
+        fields = [f"{one:8d}" for one in (number, *sets)]
+        rows = [fields[:8], *(fields[i : i + 8] for i in range(8, len(fields), 8))]
+        yield f"$ all joints together; case control: MPC = {number}\n"
+        yield "\n".join(("MPCADD  " if i == 0 else " " * 8) + "".join(row) for i, row in enumerate(rows)) + "\n"
 
 
 def _worthless(fit: Fit, intervals: dict[str, tuple[float, float]]) -> set[FittedParameter]:

@@ -50,6 +50,19 @@ def test_one_point_of_a_saved_fit_becomes_cards(found):
     assert result.returncode == 0, result.stderr
     assert "joint point bolt2" in result.stdout
     assert f"k_x = {found[0]['fits'][0]['parameters']['bolt2.k_x']['value']:.5g}" in result.stdout
+    both = run_command("export", found[1], "nastran:bolt2=3,4:bolt1=1,2")
+    assert both.returncode == 0, both.stderr
+    elements = [line.split() for line in both.stdout.splitlines() if line.startswith("CBUSH") or "DMIG" in line]
+    assert both.stdout.index("joint point bolt1") < both.stdout.index("joint point bolt2")
+    assert elements
+    for words, message in (
+        ("nastran:bolt1=1,2", "--export must name the nodes of each joint, bolt1, bolt2"),
+        ("nastran:bolt1=1,2:bolt1=3,4", "names bolt1 twice"),
+        ("nastran:bolt1=1:bolt2=3,4", "is not a program and nodes j and k"),
+    ):
+        refused = run_command("export", found[1], words)
+        assert refused.returncode == 2
+        assert message in refused.stderr
     result = run_command("export", found[1], "nastran:1,2")
     assert result.returncode == 2
     assert "--point must name one joint point of the file, bolt1, bolt2" in result.stderr
@@ -62,7 +75,7 @@ def test_one_point_of_a_saved_fit_becomes_cards(found):
         (("--points", "bolt1"), "--points names 1, --j 2 and --k 2"),
         (("--points", "bolt1,bolt1"), "--points names a joint point twice"),
         (("--points", "bolt1,bolt2", "--at", "0,0,0"), "--at does not go with it"),
-        (("--points", "bolt1,bolt2", "--export", "nastran:1,2"), "--points does not go with --export"),
+        (("--points", "bolt1,bolt2", "--export", "nastran:1,2"), "--export must name the nodes of each joint, bolt1"),
         (("--points", "bolt1,bolt2", "--model", CASE / "none.toml"), "it does not go with --model"),
     ],
 )
