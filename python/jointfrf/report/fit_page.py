@@ -199,12 +199,13 @@ def _model_sections(fit: Fit, options: ReportOptions) -> list[Section]:
 
 def _drawn(fit: Fit, options: ReportOptions) -> list[Part]:
     sketch = assembly_sketch(options.parts, fit.responses, fit.forces) if options.parts else None
-    return [] if sketch is None else [sketch, *_in_space(fit, options)]
+    return [*([] if sketch is None else [sketch]), *_in_space(fit, options)]
 
 
 def _in_space(fit: Fit, options: ReportOptions) -> list[Part]:
-    view = space_of_fit(fit, options.parts) if options.space else None
-    return [] if view is None else [view]
+    if not options.space:
+        return []
+    return [space_of_fit(fit, options.parts) or Words(["The places of points are not known: no view in space."])]
 
 
 def _channels(fit: Fit) -> Table:

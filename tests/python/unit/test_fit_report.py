@@ -515,3 +515,5 @@ def test_a_view_in_space_of_a_fit_with_models_has_both_parts(tmp_path):
     assert np.median(abs(np.diff(shapes_of(content), axis=0))) < 3
     assert space_of_fit(fit, ()) is None
     assert "newPlot" not in jf.write_report(fit, tmp_path / "report.html", parts=measured.sketched).read_text()
+    (section,) = [one for one in fit_document(fit, ReportOptions(space=True)).sections if one.key == "joint"]
+    assert "no view in space" in section.parts[0].sentences[0]
