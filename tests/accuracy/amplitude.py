@@ -2,8 +2,8 @@
 
 Prints the tables of docs/accuracy.md and, of the check, docs/checks.md. Eight levels of a stepped sine at one drive
 point, four responses, 180 to 400 Hz in steps of 2 Hz about the first bending mode, 1 % noise. Of both halves Young's
-moduli are believed to 1 %, the loss factor, 0.001, to 50 %: draw i is of a beam of its own, of these drawn so (seed [7,
-i]). The noise of draw i of level l, both from 0, has the seed 1000 l + i.
+moduli are believed to 1 %, the loss factor, 0.001, to 50 %: draw i of level l, both from 0, is of a beam of its own
+that is drawn so, with the seed [7, 1000 l + i]; its noise has the seed 1000 l + i.
 
 amplitude [CONTROL...] [--draws N] [--levels NUMBER...]: joint (its relative rotation is held), response (the free end
 of B), force; alarms: linear tests that are called bent (draw i has the seed i); check: what `jf.check_frfs` calls bent,
@@ -75,7 +75,7 @@ def coverage(control: str, numbers: Iterable[int], draws: int) -> Iterator[str]:
         level = LEVELS[control][number]
         own, off, width, at, orders = np.zeros(2), [], [], [], []
         for draw in range(draws):
-            beam = truth(draw)
+            beam = truth(1000 * number + draw)
             steady, drive = measured(beam, control, level)
             h = jf.pollute(steady.h[:, :, None], NOISE, seed=1000 * number + draw)
             fit = jf.identify_model(FREQ_HZ, h, believed(), CHANNELS, CHANNELS[:1])
