@@ -321,7 +321,10 @@ def _is_wide(low: float, high: float) -> bool:
 
 
 def _with_best_estimates(fit: Fit, result: JointEstimate) -> Fit:
-    """Return the fit with a best estimate of each stiffness that may be infinite: by the median of 1/k >= 0."""
+    """Return the fit with a best estimate of each stiffness that may be infinite: by the median of 1/k >= 0.
+
+    Its error is that of the lower limit, by profile where noise is not normal in 1/k: the median lies above the limit.
+    """
     estimate, intervals = fit.estimate.copy(), None
     for group in result.groups:
         if not group.joint.in_compliance:
@@ -330,10 +333,12 @@ def _with_best_estimates(fit: Fit, result: JointEstimate) -> Fit:
         for i in np.flatnonzero(group.joint.is_compliance & (group.x < _NEARLY_OPEN * error)):
             which = int(group.which[i])
             intervals = fit.confidence_interval(0.95) if intervals is None else intervals
-            if np.isfinite(intervals[fit.parameters[which].name][1]) or not error[i] > 0:
+            low, high = intervals[fit.parameters[which].name]
+            own = (1 / low - group.x[i]) / float(ndtri(0.975)) if low > 0 else error[i]
+            if np.isfinite(high) or not own > 0:
                 continue
-            z = float(group.x[i] / error[i])
-            estimate[which] = 1 / (error[i] * (z + float(ndtri(1 - 0.5 * ndtr(z)))))
+            z = float(group.x[i] / own)
+            estimate[which] = 1 / (own * (z + float(ndtri(1 - 0.5 * ndtr(z)))))
     return replace(fit, estimate=estimate)
 
 

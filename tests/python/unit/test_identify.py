@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+from trials import Trial
 
 import jointfrf as jf
 from jointfrf.identification.manifold import fit as fit_module
@@ -156,6 +157,16 @@ def test_a_joint_too_stiff_to_be_seen_is_said_with_its_bound(beams):
     assert jf.fit_to_dict(fit)["parameters"]["k_y"]["std_error"] is None
     assert fit.value["k_theta"] == pytest.approx(5e3, rel=0.05)
     json.dumps(jf.fit_to_dict(fit), allow_nan=False)
+
+
+@pytest.mark.parametrize("seed", [10, 30])
+def test_a_best_estimate_lies_above_its_lower_bound_on_a_few_lines_too(seed):
+    """By the error of 1/k from the information alone it lay below it in these draws."""
+    freq, measured, joint = Trial("3.3", "complex", 0.05, step=300).draw(seed)
+    with pytest.warns(jf.IdentificationWarning, match="k_theta: .* cannot be distinguished from a rigid one; at least"):
+        fit = jf.identify(freq, measured, joint.dofs, damping="viscous")
+    low, high = fit.confidence_interval(0.95)["k_theta"]
+    assert 0 < low < fit.value["k_theta"] < high == np.inf
 
 
 def test_points_instead_of_dofs(beams):
