@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy import stats
+from statsmodels.regression.mixed_linear_model import MixedLM
 
 from jointfrf.pooling.random_effects import Mixture, RandomEffects
 
@@ -82,6 +83,16 @@ def test_balanced_groups_agree_with_the_analysis_of_variance(seed):
     low, high = effects.combination(ONE).interval(0.95)
     if ms_between > 3 * ms_within:
         assert_allclose([low, high], means.mean() + reach * np.array([-1, 1]), atol=0.06 * reach)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_reml_of_unbalanced_groups_agrees_with_statsmodels(seed):
+    rng = np.random.default_rng(seed)
+    codes = np.repeat(np.arange(8), rng.integers(1, 6, 8))
+    values = 300 + rng.normal(0, 10, 8)[codes] + rng.normal(0, 5, codes.size)
+    effects = RandomEffects(values, 1e-10 * np.eye(codes.size), np.ones((codes.size, 1)), [codes])
+    other = MixedLM(values, np.ones(codes.size), groups=codes).fit(reml=True)
+    assert_allclose(effects.reml, [other.scale, other.cov_re[0, 0]], rtol=2e-3)
 
 
 def test_a_factor_around_another_agrees_with_the_nested_analysis_of_variance():
