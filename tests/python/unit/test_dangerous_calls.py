@@ -51,6 +51,7 @@ KNOWN = {
         "import_extra",
     ): "zarr, h5py: arrays that a caller has opened, opened again by a worker",
     ("parallel/line_arrays.py", "memmap"): "numbers of a file that a caller has mapped, mapped again by a worker",
+    ("report/document.py", "import_extra"): "plotly, whose script is written into a page",
     ("studies/result.py", "import_extra"): "pyarrow, which writes",
     ("cli/study.py", "get_reusable_executor"): "processes of this machine, started in a safe environment",
     ("cli/study.py", "MPIPoolExecutor"): "processes that mpiexec has started",
