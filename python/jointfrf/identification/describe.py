@@ -27,7 +27,6 @@ from jointfrf.identification.model.joint_motion import FoundMotion
 from jointfrf.identification.model.next_channels import NextChannels
 from jointfrf.identification.model.prepare import Channels
 from jointfrf.identification.parameters import joint_vector
-from jointfrf.identification.profile import WELL
 from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.identification.result import Fit, FittedParameter, law_parameters
 from jointfrf.kernel.arguments import FloatArray
@@ -37,6 +36,8 @@ __all__ = ["describe_laws", "describe_model", "describe_springs", "poor_laws"]
 
 #: A parameter is called poorly determined when its interval is wider than this share of it on either side.
 _UNCERTAIN = 0.5
+#: One whose standard error is below this share is not: its interval need not be found.
+_WELL = 0.1
 #: Correlations beyond this are named: an error of one is then mostly that of the other.
 _CORRELATED = 0.95
 #: Names shown of pairs, bands and channels.
@@ -563,7 +564,6 @@ def describe_model(found: FoundModel, channels: Channels) -> Fit:
         *_separation(found),
         *_groups_of_joints(found),
         *_other_minimum(found.other),
-        *_lower_minimum(found),
         *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
         *_calibration(problem.noise.calibration),
         *_priors(fit, found.directions, said),
@@ -571,7 +571,7 @@ def describe_model(found: FoundModel, channels: Channels) -> Fit:
     ]
     if not found.minimum.converged:
         findings.append(warn("convergence", "the fit did not converge"))
-    return fit.with_findings([*findings, *_unbounded(found.poor_intervals, findings)])
+    return fit.with_findings(findings)
 
 
 def _model_residual(fit: Fit, found: FoundModel, channels: Channels) -> list[Finding]:
@@ -698,27 +698,6 @@ def _other_minimum(other: float) -> list[Finding]:
     return [warn("convergence", text)] if other < _OTHER else []
 
 
-def _lower_minimum(found: FoundModel) -> list[Finding]:
-    """Say where profiles end below the minimum, though the fit began again there."""
-    vector = found.problem.vector
-    places = [
-        f"{name} = {vector.value([one.name for one in vector.fitted].index(name), x[: vector.free.size]):.4g}"
-        for name, x in found.lower.items()
-    ]
-    text = (
-        f"another joint fits better than the one found, near {', '.join(places)}, as the profile of the likelihood "
-        "shows; the intervals hold both: give values of the joint that are nearer, or more FRFs"
-    )
-    return [warn("convergence", text, tuple(found.lower))] if places else []
-
-
-def _unbounded(limits: dict[str, tuple[float, float]], findings: Sequence[Finding]) -> list[Finding]:
-    """Name the parameters without a limit that no finding names yet."""
-    said = {name for one in findings if one.kind == "open" for name in one.about}
-    names = tuple(name for name, ends in limits.items() if name not in said and not np.isfinite(ends).all())
-    return [warn("open", f"{', '.join(names)}: the FRFs set no limit (95 %)", names)] if names else []
-
-
 def _priors(fit: Fit, directions: Sequence[OpenDirection], said: Collection[str]) -> list[Finding]:
     """Name unknowns of which the FRFs say no more than the prior, and directions that priors hold."""
     errors = fit.std_error
@@ -744,7 +723,7 @@ def poor_laws(fit: Fit, is_log: dict[str, bool], limits: Callable[[str], tuple[f
     found, errors = [], fit.std_error
     for one in fit.parameters:
         value = fit.value[one.name]
-        if one.origin != "joint" or not is_log[one.name] or one.unit == "s" or errors[one.name] < WELL * value:
+        if one.origin != "joint" or not is_log[one.name] or one.unit == "s" or errors[one.name] < _WELL * value:
             continue
         low, high = limits(one.name)
         if not high < float("inf") and low > 0:

@@ -9,21 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from jointfrf.identification.minimise import Linearised, Squares, inverse_information, minimise
+from jointfrf.identification.minimise import Linearised, Squares, minimise
 from jointfrf.kernel.arguments import FloatArray
 
-__all__ = ["WELL", "FunctionIntervals", "Intervals", "ProfileIntervals", "ProfiledCoordinates"]
+__all__ = ["FunctionIntervals", "Intervals", "ProfileIntervals", "ProfiledCoordinates"]
 
-#: A parameter whose standard error is below this share of it is well determined: its interval hides nothing.
-WELL = 0.1
 #: Squares on the way of the linear prediction that differ less than this from those of a parabola need no profile, and
 #: how near to a limit squares must come, relative to it; the latter where squares cost little.
 _PARABOLA, _NEAR, _PRECISE = 0.1, 0.03, 2e-4
 #: Steps in search of a limit, and where squares cost little.
 _STEPS, _MANY_STEPS = 12, 30
-#: Squares below their minimum by so much of -2 log likelihood, many times what a minimisation leaves, show that it was
-#: none; it is sought again from there so many times.
-_BELOW, _SOUGHT = 0.1, 2
 #: Linearisations at a value of the parameter that is held, and what a step promises at the last one.
 _HELD_STEPS, _HELD_LEAST = 6, 1e-2
 #: Step of a difference, in standard errors, and how far from its value a function may be that is held, likewise.
@@ -51,22 +46,6 @@ class ProfiledCoordinates(Protocol):
         """Return how far from the minimum a limit is sought first at most."""
 
 
-class HeldMinimum(Protocol):
-    """A minimum of squares, one coordinate of which may be held."""
-
-    @property
-    def x(self) -> FloatArray:
-        """Coordinates."""
-
-    @property
-    def cost(self) -> float:
-        """The squares."""
-
-    @property
-    def information(self) -> FloatArray:
-        """Half of their second derivatives."""
-
-
 class ProfileIntervals:
     """Intervals of parameters by the profile of their likelihood.
 
@@ -81,16 +60,14 @@ class ProfileIntervals:
     factor : float
         By how much variances exceed that.
     least : callable, optional
-        ``least(start, i)`` minimises the squares over all coordinates but number i, or over all where that is None,
-        where that costs little: limits are then found precisely.
+        ``least(start, i)`` returns the squares minimised over all coordinates but number i, where that costs little:
+        limits are then found precisely.
 
     Notes
     -----
     A limit is where the squares, minimised over all other parameters, exceed their minimum by the quantile of chi^2
     times the factor. The others are first taken to follow linearly; where the squares are a parabola on that way, the
-    limit follows from it without a minimisation. Squares on the way that are lower than the minimum show that it was a
-    false one: a minimum is sought from there, the interval is that of the profile about it, and holds the value given,
-    too. `x` is then where it was found.
+    limit follows from it without a minimisation.
     """
 
     def __init__(
@@ -101,24 +78,18 @@ class ProfileIntervals:
         cost: float,
         covariance: FloatArray,
         factor: float,
-        least: Callable[[FloatArray, int | None], HeldMinimum] | None = None,
+        least: Callable[[FloatArray, int], float] | None = None,
     ) -> None:
         self.squares, self.coordinates, self.x, self.cost = squares, coordinates, x, cost
-        self.covariance, self.factor, self._left = covariance, factor, _SOUGHT
+        self.covariance, self.factor = covariance, factor
         self.least = self._minimised if least is None else least
         self.steps = _STEPS if least is None else _MANY_STEPS
         self.parabola, self.near = (_PARABOLA, _NEAR) if least is None else (_PRECISE, _PRECISE)
 
     def of(self, i: int, probability: float) -> tuple[float, float]:
         """Return the interval of one parameter, by its number, that contains the true one with this probability."""
-        given = self.x
-        for _ in range(_SOUGHT + 1):
-            at = self.x
-            low, high = sorted((self.limit(i, -1, probability), self.limit(i, 1, probability)))
-            if self.x is at:
-                break
-        value = self.coordinates.value(i, given)
-        return (low, high) if self.x is given else (min(low, value), max(high, value))
+        low, high = sorted((self.limit(i, -1, probability), self.limit(i, 1, probability)))
+        return low, high
 
     def limit(self, i: int, sign: int, probability: float) -> float:
         """Return the limit of one parameter below (-1) or above (1) in its coordinate, or its end without one."""
@@ -142,10 +113,7 @@ class ProfileIntervals:
                 excess = self._excess(self.squares.cost(self._there(sign * reach * along)))
                 if abs(excess / quadratic - 1) < self.parabola:
                     return self._value(i, sign * reach * np.sqrt(limit / excess))
-            least = self.least(self._there(sign * reach * along), i)
-            if self._is_false(least.x, least.cost):
-                return end
-            excess = self._excess(least.cost)
+            excess = self._excess(self.least(self._there(sign * reach * along), i))
             # Beyond a parameter that cannot be negative squares rise like a wall.
             if abs(excess / limit - 1) < self.near or high - low < _WALL * self.near * reach:
                 break
@@ -168,17 +136,6 @@ class ProfileIntervals:
 
         None where it does not change with the coordinates, or has no derivative.
         """
-        given = self.x
-        for _ in range(_SOUGHT + 1):
-            at = self.x
-            found = self._of_function(function, probability)
-            if self.x is at:
-                break
-        if found is None or self.x is given:
-            return found
-        return min(found[0], function(given)), max(found[1], function(given))
-
-    def _of_function(self, function: Callable[[FloatArray], float], probability: float) -> tuple[float, float] | None:
         best, x = function(self.x), self.x
         steps = _SLOPE * np.sqrt(np.maximum(np.diagonal(self.covariance), 0)) * np.eye(x.size)
         size = np.maximum(np.diagonal(steps), np.finfo(float).tiny)
@@ -199,10 +156,7 @@ class ProfileIntervals:
             for _ in range(_STEPS):
                 held = _HeldFunction(self.squares, function, best + sign * reach, variance)
                 there = minimise(held, there, None, _HELD_STEPS, _HELD_LEAST).x
-                cost = self.squares.cost(there)
-                if self._is_false(there, cost):
-                    return -np.inf, np.inf
-                excess = self._excess(cost)
+                excess = self._excess(self.squares.cost(there))
                 if abs(excess / limit - 1) < self.near:
                     break
                 low, high = (reach, high) if excess < limit else (low, reach)
@@ -213,21 +167,8 @@ class ProfileIntervals:
             ends.append(best + sign * reach if high < np.inf or excess > (1 - 2 * self.near) * limit else sign * np.inf)
         return ends[0], ends[1]
 
-    def _minimised(self, start: FloatArray, i: int | None) -> HeldMinimum:
-        if i is None:
-            return minimise(self.squares, start)
-        return minimise(self.squares, start, i, _HELD_STEPS, _HELD_LEAST)
-
-    def _is_false(self, x: FloatArray, cost: float) -> bool:
-        """Whether squares show that the minimum was a false one; another is then sought from there, a few times."""
-        if not cost < self.cost - _BELOW * self.squares.unit:
-            return False
-        if self._left:
-            self._left -= 1
-            found = self.least(x, None)
-            self.x, self.cost = found.x, found.cost
-            self.covariance = self.squares.unit * inverse_information(found.information, open_ends=True)
-        return True
+    def _minimised(self, start: FloatArray, i: int) -> float:
+        return minimise(self.squares, start, i, _HELD_STEPS, _HELD_LEAST).cost
 
     def _there(self, step: FloatArray) -> FloatArray:
         return np.asarray(np.clip(self.x + step, *self.squares.bounds))

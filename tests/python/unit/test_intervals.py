@@ -13,8 +13,6 @@ from jointfrf.identification.manifold.uncertainty import (
     profile_interval,
     spread_of,
 )
-from jointfrf.identification.minimise import Linearised, minimise
-from jointfrf.identification.profile import ProfileIntervals
 from jointfrf.identification.scatter import BLOCKS
 
 FREQ = np.linspace(20.0, 500.0, 100)
@@ -90,44 +88,6 @@ def test_a_dof_that_may_be_rigid_shows_no_damping():
     assert profile_interval(group, 0, 1.0)[1] == np.inf
     low, high = profile_interval(group, 3, 1.0)
     assert low < 40 < high < 60
-
-
-class TwoValleys:
-    """Squares of (u, v) with valleys at u = 1, and at -1 where they are lower by 4."""
-
-    unit = 1.0
-    bounds, longest = (np.full(2, -np.inf), np.full(2, np.inf)), np.full(2, np.inf)
-
-    def cost(self, x):
-        u, v = x
-        return 1.5 * (u**2 - 1) ** 2 + 2 * u + (v - u) ** 2
-
-    def linearised(self, x):
-        u, v = x
-        gradient = np.array([6 * u * (u**2 - 1) + 2 - 2 * (v - u), 2 * (v - u)])
-        information = np.array([[max(18 * u**2 - 6, 4.0) + 2, -2.0], [-2.0, 2.0]])
-        return Linearised(self.cost(x), information / 2, -gradient / 2)
-
-    value, end, longest_reach = (lambda _, i, x: x[i]), (lambda _, i, sign: sign * np.inf), (lambda *_: np.inf)
-
-
-@pytest.mark.parametrize("index", [0, 1])
-def test_a_profile_that_falls_below_a_false_minimum_is_that_of_the_true_one(index):
-    """Brute force: squares on a grid of both coordinates."""
-    squares = TwoValleys()
-    false = minimise(squares, np.array([1.2, 1.2]))
-    assert false.x[0] > 0.7
-    covariance = np.linalg.inv(false.information)
-    profiles = ProfileIntervals(squares, squares, false.x, false.cost, covariance, 1.0)
-    low, high = profiles.of(index, 0.95)
-    u, v = np.linspace(-3, 3, 1201)[:, None], np.linspace(-5, 5, 2001)
-    grid = squares.cost((u, v))
-    at = np.unravel_index(grid.argmin(), grid.shape)
-    np.testing.assert_allclose(profiles.x, [u[at[0], 0], v[at[1]]], atol=0.02)
-    inside = [u[:, 0], v][index][grid.min(axis=1 - index) < grid.min() + REACH**2]
-    assert low == pytest.approx(inside.min(), abs=0.03)
-    # The value given is inside, too, though the profile is below the limit there no more.
-    assert high == pytest.approx(max(inside.max(), false.x[index]), abs=0.03)
 
 
 @pytest.mark.parametrize("index", [0, 1])

@@ -10,8 +10,6 @@ import pytest
 import jointfrf as jf
 from jointfrf.cases.known_joint.decoupling import decoupling_bound, fit_decoupling
 from jointfrf.identification.line_starts import from_lines
-from jointfrf.identification.minimise import minimise
-from jointfrf.identification.model import fit as model_fit
 from jointfrf.identification.model.prediction import Prediction, parameter_vector
 from jointfrf.identification.model.prepare import Channels, prepare_model_fit
 from jointfrf.identification.model.reduced import MatrixPolynomial
@@ -395,35 +393,6 @@ def test_intervals_are_profiles_of_the_likelihood():
         assert profile - least == pytest.approx(3.84, rel=0.12)
     with pytest.raises(ValueError, match="probability must lie between 0 and 1"):
         fit.confidence_interval(1.0)
-
-
-@pytest.mark.parametrize(("seed", "false"), [(18, (88.0, -7.0)), (54, (1421.0, 10.0))])
-def test_a_fit_begun_in_a_false_minimum_leaves_it_where_a_profile_falls_below(seed, false, monkeypatch):
-    """Twelve lines with 70 % noise have several minima; brute force: all k and c of a grid, by the closed formula."""
-    freq = np.linspace(0.5, 10, 12)
-    chains = (
-        jf.chain([5, 3], [2500, 3500], [3, 4], ground="start"),
-        jf.chain([4, 2], [2000, 2500], [2, 1], ground="end"),
-    )
-    a, b = (jf.Substructure(one, [dof], exact=True) for one, dof in zip(chains, ("2:x", "1:x"), strict=True))
-    whole = jf.Assembly(a, b, jf.Joint([2000.0], [3.0], dofs=["x"]))
-    h = jf.pollute(whole.receptance(freq, ["A/1:x"], ["B/2:x"]), 0.7, seed=seed)
-    h_a, h_b = (one.receptance(freq) for one in chains)
-    k, c = np.geomspace(20, 3000, 400)[:, None], np.linspace(-60, 80, 1401)
-
-    def begun(problem):
-        return minimise(problem.likelihood, problem.vector.to_coordinates(np.array(false))), np.inf
-
-    monkeypatch.setattr(model_fit, "lowest_minimum", begun)
-    fit = fit_of(freq, h, whole, ["A/1:x"], ["B/2:x"], noise=0.7)
-    profile = sum(
-        2 * abs(h_a[i, 0, 1] * h_b[i, 0, 1] / (1 / (k + 2j * np.pi * f * c) + h_a[i, 1, 1] + h_b[i, 0, 0]) - y) ** 2 / v
-        for i, (f, y, v) in enumerate(zip(freq, h[:, 0, 0], fit.data.variance[:, 0, 0], strict=True))
-    ).min(axis=-1)  # fmt: skip
-    assert np.interp(fit.value["k_x"], k[:, 0], profile) < profile.min() + 0.05
-    for limit in fit.confidence_interval(0.95)["k_x"]:
-        assert np.interp(limit, k[:, 0], profile) - profile.min() == pytest.approx(3.84, rel=0.12)
-    assert any("another joint fits nearly as well" in one for one in fit.warnings)
 
 
 def test_gains_of_channels_are_found_beside_the_joint():

@@ -238,7 +238,7 @@ def profile_interval(group: FormMinimum, i: int, factor: float, probability: flo
     best = group if joint is group.joint else joint.lowest(group.forms, joint.coordinates(group.joint.theta(group.x)))
     profile = ProfileIntervals(
         FormSquares(group.forms, joint), joint, best.x, best.cost, best.covariance, factor,
-        (lambda x, held: joint.lowest(group.forms, x, held, _PRECISE)) if joint.is_compliance.any() else None,
+        (lambda x, held: joint.lowest(group.forms, x, held, _PRECISE).cost) if joint.is_compliance.any() else None,
     )  # fmt: skip
     if not (joint.may_be_rigid(i) and _may_be_rigid(group, int(joint.dofs[i]), factor, probability)):
         return profile.of(i, probability)

@@ -26,7 +26,7 @@ from jointfrf.identification.model.starts import ranked_trials, refined
 from jointfrf.identification.model.uncertainty import ModelGradient
 from jointfrf.identification.noise import KnownNoise, noise_about
 from jointfrf.identification.parameters import ParameterVector
-from jointfrf.identification.profile import WELL, Intervals, ProfileIntervals
+from jointfrf.identification.profile import Intervals, ProfileIntervals
 from jointfrf.identification.residual_test import ResidualTest, check_residual
 from jointfrf.identification.scatter import Spread
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -54,8 +54,6 @@ _TURNS = 2
 _OF_SPREAD = 2.0
 #: Reductions of the models are extended at most so many times.
 _REFINED = 3
-#: The fit begins again so many times where profiles show that its minimum was a false one.
-_AGAIN = 2
 
 
 @dataclass(frozen=True)
@@ -141,8 +139,6 @@ class FoundModel(NamedTuple):
         What smooth errors of channels add to the coordinates.
     unseparated : tuple of Unseparated
         Parameters of several joints that the FRFs do not tell apart.
-    lower : dict of str to ndarray
-        Parameters whose profile fell below the minimum, and the coordinates of the minimum beside it.
     """
 
     problem: ModelProblem
@@ -160,18 +156,6 @@ class FoundModel(NamedTuple):
     spread: Spread
     calibration: CalibrationSpread | None
     unseparated: tuple[Unseparated, ...]
-    lower: dict[str, FloatArray]
-
-    @property
-    def poor_intervals(self) -> dict[str, tuple[float, float]]:
-        """Intervals of the parameters of joints that are not well determined."""
-        vector = self.problem.vector
-        value, error = self.values[vector.free], np.sqrt(np.diagonal(self.covariance))
-        return {
-            one.name: self.intervals.of(one.name, 0.95)
-            for one, is_poor in zip(vector.fitted, ~(error < WELL * abs(value)), strict=False)
-            if is_poor and one.origin == "joint"
-        }
 
 
 def fit_assembly(problem: ModelProblem) -> FoundModel:
@@ -194,22 +178,7 @@ def fit_assembly(problem: ModelProblem) -> FoundModel:
             problem = changed
             minimum = minimise(problem.likelihood, minimum.x)
         likelihood, minimum = with_spreads(problem.likelihood, minimum)
-        return _at_its_minimum(_judged(replace(problem, vector=likelihood.vector), minimum, other))
-
-
-def _at_its_minimum(found: FoundModel) -> FoundModel:
-    """Return the fit, begun again where profiles fall below a minimum: it was a false one, though near to start."""
-    for _ in range(_AGAIN):
-        problem, given = found.problem, found.minimum
-        if not (found.poor_intervals and found.lower):
-            break
-        likelihood, n = problem.likelihood, problem.vector.free.size
-        starts = [minimise(likelihood, x[:n]) for x in found.lower.values()]
-        best, cost = min(starts, key=lambda one: one.cost), likelihood.cost(given.x[:n])
-        if not best.cost < cost:
-            break
-        found = _judged(problem, best, cost - best.cost)
-    return found
+        return _judged(replace(problem, vector=likelihood.vector), minimum, other)
 
 
 def _explained(problem: ModelProblem, minimum: Minimum) -> float:
@@ -364,14 +333,14 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
     whole = inverse_information(minimum.information, open_ends=True)
 
     of_spread = spread_factors(vector, minimum)[:n] > _OF_SPREAD if vector.means else np.zeros(n, bool)
-    profiles = _Profiles(likelihood, vector, minimum, whole, factor, of_spread, {})
+    profiles = _Profiles(likelihood, vector, minimum, whole, factor, of_spread)
     intervals = Intervals([one.name for one in vector.fitted[:n]], profiles.of, profiles.of_function)
     of_shown = problem.vector, minimum.x[:n], minimum.information[:n, :n]
     directions = open_directions(*of_shown)
     return FoundModel(
         problem, minimum, values, covariance, intervals, predicted, residual, test,
         directions, other, None if found is None else found[2], with_error, spread, calibration,
-        unseparated(*of_shown, directions), profiles.lower,
+        unseparated(*of_shown, directions),
     )  # fmt: skip
 
 
@@ -380,7 +349,7 @@ class _Profiles:
     """Profiles of the parameters at a minimum, each with its variance factor.
 
     The likelihood has one spread for joints that are alike: where most of a variance is due to others, `of_spread`, the
-    interval follows from it. `lower` gathers minima that profiles find beside it, by the parameter.
+    interval follows from it.
     """
 
     likelihood: Likelihood
@@ -389,7 +358,6 @@ class _Profiles:
     covariance: FloatArray
     factor: FloatArray
     of_spread: NDArray[np.bool_]
-    lower: dict[str, FloatArray]
 
     def _profile(self, factor: float) -> ProfileIntervals:
         least = self.minimum
@@ -404,11 +372,7 @@ class _Profiles:
             return low, high
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", IllConditionedWarning)  # on the way to limits that are far off
-            profile = self._profile(float(self.factor[i]))
-            limits = profile.of(i, probability)
-        if profile.x is not self.minimum.x:
-            self.lower[self.vector.fitted[i].name] = profile.x
-        return limits
+            return self._profile(float(self.factor[i])).of(i, probability)
 
     def of_function(
         self, function: Callable[[FloatArray], float], used: NDArray[np.intp], probability: float
