@@ -22,7 +22,7 @@ import jointfrf as jf
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python" / "support"))
 
-from harmonic_balance import SECTION, IwanBeam, Sliders, Steady, iwan_beam
+from harmonic_balance import IwanBeam, Sliders, Steady, believed, iwan_beam
 
 FREQ_HZ = np.arange(180.0, 400.5, 2.0)
 CHANNELS = ["A/1:y", "A/15:y", "B/9:y", "B/25:y"]
@@ -44,19 +44,6 @@ def truth(number: int) -> IwanBeam:
     rng = np.random.default_rng([7, number])
     moduli, losses = 210e9 * (1 + 0.01 * rng.normal(size=2)), 0.001 + 0.0005 * rng.normal(size=2)
     return iwan_beam(Sliders.iwan(*IWAN), youngs_modulus=tuple(moduli), loss_factor=tuple(np.maximum(losses, 1e-5)))
-
-
-def believed() -> jf.Assembly:
-    """Return what is believed of it."""
-    halves = [
-        jf.Substructure(
-            jf.beam(0.36, 24, youngs_modulus=210e9, loss_factor=0.001, **SECTION), joint,
-            {"youngs_modulus": jf.Unknown(1.0, 0.01), "loss_factor": jf.Unknown(0.001, 0.0005, lower=0)}, exact=True,
-        )
-        for joint in (["25:y", "25:theta"], ["1:y", "1:theta"])
-    ]  # fmt: skip
-    joint = jf.LawJoint({"theta_z": jf.SpringLaw(1e5, h=1e3)}, ["y"], dofs=["y", "theta_z"])
-    return jf.Assembly(*halves, joint)
 
 
 def measured(beam: IwanBeam, control: str, level: float) -> tuple[Steady, jf.Drive]:

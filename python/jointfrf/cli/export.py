@@ -24,7 +24,16 @@ from jointfrf.kernel.arguments import FloatArray
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.spelling import did_you_mean
 
-__all__ = ["CardRequest", "add_arguments", "add_card_arguments", "card_request", "parse_export", "run", "written_cards"]
+__all__ = [
+    "CardRequest",
+    "add_arguments",
+    "add_card_arguments",
+    "card_request",
+    "page_nodes",
+    "parse_export",
+    "run",
+    "written_cards",
+]
 
 
 #: Arguments of `export` in its messages, and the options that stand for them.
@@ -245,6 +254,11 @@ def _ends(text: str, program: str, rest: str) -> list[int]:
             "abaqus:fl=9001,9002:fr=9003,9004; calculix takes two ROT NODEs more"
         )
     return ends
+
+
+def page_nodes(args: argparse.Namespace) -> Sequence[int]:
+    """Return the nodes in the cards that a page shows: those of one joint, where they are named."""
+    return (1, 2) if args.export is None or isinstance(args.export[1], dict) else args.export[1]
 
 
 def _faces(text: str) -> tuple[list[int], list[int]]:

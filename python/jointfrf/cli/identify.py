@@ -15,7 +15,7 @@ from jointfrf.channels.check.check import warn_of_frfs
 from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.channels.point_lines import difference_error
 from jointfrf.cli.check import check_joint
-from jointfrf.cli.export import add_card_arguments, card_request, parse_export, written_cards
+from jointfrf.cli.export import add_card_arguments, card_request, page_nodes, parse_export, written_cards
 from jointfrf.cli.identify_model import add_model_arguments, run_model
 from jointfrf.cli.joint_laws import add_law_arguments, joint_of_laws
 from jointfrf.cli.measured_file import (
@@ -45,7 +45,7 @@ from jointfrf.laws.law_joint import LawJoint
 from jointfrf.report.fit_page import write_report
 from jointfrf.spelling import did_you_mean
 
-__all__ = ["add_arguments", "options_of_compliance", "run"]
+__all__ = ["add_arguments", "run"]
 
 #: Methods that need no model.
 _METHODS = ("compliance", "inverse-substructuring")
@@ -201,10 +201,9 @@ def run(args: argparse.Namespace) -> int:
         out.say("", text.rstrip("\n"))
     if args.report is not None:
         fit = fits[args.method.index("compliance")]
-        ends = (1, 2) if args.export is None or isinstance(args.export[1], dict) else args.export[1]
         args.report.parent.mkdir(parents=True, exist_ok=True)
-        written.append(write_report(fit, args.report, source=file_names(args), command=args.typed, nodes=ends,
-                                    space=args.space))  # fmt: skip
+        written.append(write_report(fit, args.report, source=file_names(args), command=args.typed,
+                                    nodes=page_nodes(args), space=args.space))  # fmt: skip
     if args.out is not None:
         written += _write_figures(args, frfs, joint, fits)
     out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
@@ -298,7 +297,7 @@ def _fit(
         warnings.simplefilter("ignore", ConvergenceWarning)
         warnings.simplefilter("ignore", FrfCheckWarning)  # printed with the names of the channels
         if method == "compliance":
-            options = options_of_compliance(args, frfs, joint, laws)
+            options = _of_compliance(args, frfs, joint, laws)
             if sides:
                 options["sides"] = sides
             return identify(frfs.freq_hz, joint.h, joint.dofs, args.band, **options)
@@ -315,23 +314,20 @@ def _square(joint: MeasuredJoint) -> np.ndarray:
     return np.ascontiguousarray(joint.responses.transform @ joint.h @ joint.forces.transform.T)
 
 
-def options_of_compliance(
+def _of_compliance(
     args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, laws: LawJoint | None
 ) -> dict[str, Any]:
-    """Return the options of the compliance fit: damping, cross terms, noise, coherence where the file has it."""
+    """Return the options of the compliance fit: what is known of the channels, damping, cross terms, noise."""
+    known = joint.known(frfs)
     terms = {"damping": args.damping, "cross": args.cross} if laws is None else {"joint": laws}
     if args.same is not None:
         terms["same"] = args.same
-    names = joint.responses.channels, joint.forces.channels
-    coherence = frfs.coherence_matrix(*names)
-    known = {} if coherence is None else {"coherence": coherence, "averages": frfs.least_averages(*names)}
     return {
-        "transform": joint.transform,
+        **known,
         "noise": args.noise,
-        "setups": setups_with_gains(args, frfs.setups_between(*names), joint.h.shape),
+        "setups": setups_with_gains(args, known["setups"], joint.h.shape),
         **({"window_decay": args.window_decay} if args.window_decay is not None else {}),
         **terms,
-        **known,
     }
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from jointfrf.assembly_file.measured import MeasuredAssembly, measured_assembly
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
-from jointfrf.cli.export import CardRequest, card_request, written_cards
+from jointfrf.cli.export import CardRequest, card_request, page_nodes, written_cards
 from jointfrf.cli.measured_file import file_names, read_receptances, setups_with_gains
 from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import Output, UsageError, complain, time_left, waiting
@@ -169,9 +169,8 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
         write_record(args.save, fit_to_dict(fit, lines=args.save_lines) | {"source": source})
         written.append(args.save)
     if args.report is not None:
-        ends = (1, 2) if args.export is None or isinstance(args.export[1], dict) else args.export[1]
         args.report.parent.mkdir(parents=True, exist_ok=True)
-        written.append(write_report(fit, args.report, source=source, command=args.typed, nodes=ends,
+        written.append(write_report(fit, args.report, source=source, command=args.typed, nodes=page_nodes(args),
                                     parts=measured.sketched, space=args.space))  # fmt: skip
     if args.out is not None:
         from jointfrf.report.fit import write_fit

@@ -18,7 +18,6 @@ from jointfrf.amplitude.levels import JointLevel, JointLevels, levels
 from jointfrf.amplitude.lines import Drive, MotionQuantity
 from jointfrf.assembly_file.measured import measured_assembly
 from jointfrf.assembly_file.read import read_assembly_file
-from jointfrf.cli.identify import options_of_compliance
 from jointfrf.cli.measured_file import READING, add_joint_arguments, read_receptances, words
 from jointfrf.cli.measured_joint import measured_joint
 from jointfrf.cli.parser import CommandParser, one_of
@@ -38,11 +37,6 @@ __all__ = ["add_arguments", "run"]
 
 #: Options that say where FRFs at the joint are.
 _OF_THE_JOINT = ("--j", "--k", "--dofs", "--at", "--at-k", "--channels", "--spacing", "--axis")
-#: What `identify` would ask besides of FRFs at the joint: K* of no cross terms, damping by what the data support.
-_AS_IDENTIFY: dict[str, Any] = {
-    "points": None, "same": None, "damping": "auto", "cross": "zero", "window_decay": None, "setup_gain": None,
-    "common_gain": None,
-}  # fmt: skip
 #: Columns of a table of tests.
 _FILE, _LABEL, _LEVEL = "file", "label", "level"
 
@@ -96,6 +90,7 @@ def add_arguments(parser: CommandParser) -> None:
     parser.option("--noise LEVEL", "relative noise of the FRFs, 0.01 for 1 %% (default: from them)", float)
     parser.option("--laws NAME,...", f"laws over amplitude that are fitted: {', '.join(AMPLITUDE_LAWS)} (all)", _laws)
     add_joint_arguments(parser)
+    parser.set_defaults(points=None)  # one joint point
     parser.heading("results")
     parser.option("--report FILE", "write a page (HTML) with figures of stiffness and loss factor over amplitude", Path)
     parser.option("--output FILE", "write the result as a table (CSV)", Path)
@@ -284,7 +279,7 @@ def _drive(args: argparse.Namespace, test: _Test) -> Drive:
 
 def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Drive]:
     """Return the fit of a test, and what was held by the names of the fit."""
-    own = argparse.Namespace(**vars(args) | _AS_IDENTIFY | {"files": [test.path]})
+    own = argparse.Namespace(**vars(args) | {"files": [test.path]})
     frfs = read_receptances(own)
     if args.model is not None:
         measured = measured_assembly(args.model, frfs, bands=args.band)
@@ -296,7 +291,7 @@ def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Driv
         hint = did_you_mean(drive.channel, channels)
         raise UsageError(f"--held {drive.channel}: {test.path.name} has {', '.join(channels)} at the joint{hint}")
     with waiting(f"fit of {test.path.name}"):
-        fit = identify(frfs.freq_hz, joint.h, joint.dofs, args.band, **options_of_compliance(own, frfs, joint, None))
+        fit = identify(frfs.freq_hz, joint.h, joint.dofs, args.band, noise=args.noise, **joint.known(frfs))
     if drive.held == "response" and isinstance(fit.data, FitData):
         drive = replace(drive, channel=fit.data.response_names[channels.index(drive.channel)])
     return fit, drive

@@ -94,6 +94,13 @@ class MeasuredJoint:
             return None
         return self.responses if self.responses is self.forces else (self.responses, self.forces)
 
+    def known(self, frfs: FrfSet) -> dict[str, Any]:
+        """Return what `identify` takes of the channels: to the joint DOFs, set-ups, coherence where the file has it."""
+        names = self.responses.channels, self.forces.channels
+        coherence = frfs.coherence_matrix(*names)
+        shared = {} if coherence is None else {"coherence": coherence, "averages": frfs.least_averages(*names)}
+        return {"transform": self.transform, "setups": frfs.setups_between(*names), **shared}
+
     @property
     def dofs(self) -> tuple[str, ...]:
         """Names of the joint DOFs."""

@@ -12,7 +12,7 @@ from scipy.linalg import eig
 from scipy.optimize import brentq
 
 import jointfrf as jf
-from harmonic_balance import SECTION, Sliders, iwan_beam
+from harmonic_balance import Sliders, believed, iwan_beam
 from jointfrf.amplitude.friction import iwan
 from jointfrf.cli.main import main
 from jointfrf.io import write_frfs
@@ -28,18 +28,6 @@ CASE = Path(__file__).resolve().parents[3] / "cases" / "iwan-beam"
 @pytest.fixture(scope="module")
 def beam():
     return iwan_beam(Sliders.iwan(*IWAN), youngs_modulus=(1.004 * 210e9, 0.998 * 210e9), loss_factor=0.0012)
-
-
-def believed():
-    halves = [
-        jf.Substructure(
-            jf.beam(0.36, 24, youngs_modulus=210e9, loss_factor=0.001, **SECTION), joint,
-            {"youngs_modulus": jf.Unknown(1.0, 0.01), "loss_factor": jf.Unknown(0.001, 0.0005, lower=0)}, exact=True,
-        )
-        for joint in (["25:y", "25:theta"], ["1:y", "1:theta"])
-    ]  # fmt: skip
-    joint = jf.LawJoint({"theta_z": jf.SpringLaw(1e5, h=1e3)}, ["y"], dofs=["y", "theta_z"])
-    return jf.Assembly(*halves, joint)
 
 
 def fitted(h, noise=0.01, seed=1):

@@ -55,13 +55,7 @@ class LineForms(NamedTuple):
 
     def on_slice(self, lines: slice) -> LineForms:
         """Return some of the lines; neighbouring ones without a copy."""
-        kept = np.ascontiguousarray
-        return LineForms(
-            kept(self.compliance[lines]),
-            kept(self.weight[lines]),
-            kept(self.gradient[lines]),
-            kept(self.squares[lines]),
-        )
+        return LineForms._make(np.ascontiguousarray(one[lines]) for one in self)
 
     def scaled(self, line_weight: FloatArray) -> LineForms:
         """Return the same with each line weighted."""
