@@ -146,7 +146,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _write_joints(found: JointLevels, folder: Path) -> list[Path]:
     """Write the joint of each level by its label."""
-    names = {label: re.sub(r"[^\w.+-]", "_", label) for label in found.joints}
+    names = {label: re.sub(r"^\.|[^\w.+-]", "_", label) for label in found.joints}
     if len(set(names.values())) < len(names):
         raise UsageError("--joints: two labels give the same name of a file")
     folder.mkdir(parents=True, exist_ok=True)
