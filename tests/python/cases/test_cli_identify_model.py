@@ -13,6 +13,7 @@ import pytest
 
 import jointfrf as jf
 from command import run_command
+from documents import DOCUMENTS, agree, blocks
 from jointfrf.assembly_file.read import read_assembly_file
 from jointfrf.cli.export import CardRequest
 from jointfrf.cli.identify_model import _place_of_joint, _rigid_faces
@@ -67,6 +68,15 @@ def test_intervals_hold_the_joint_at_the_levels(table, make):
             assert float(row["value"]) == pytest.approx(true, rel=0.003 if row["unit"] != "1" else 0.08)
     assert {name: (sum(own), len(own)) for name, own in held.items()} == {"k_theta_z": (8, 8), "eta_theta_z": (8, 8)}
     assert result.stderr == ""
+
+
+def test_the_table_in_the_readme_is_what_the_command_prints(table):
+    readme = DOCUMENTS["cases/lap-beam/README.md"]
+    (command,), (shown,) = blocks("sh", readme), blocks("text", readme)
+    words = command.replace("cases/lap-beam/level_*.uff", " ".join(map(str, LEVELS)))
+    words = words.replace("cases/lap-beam/assembly.toml", str(LAP / "assembly.toml")).split()
+    assert words == ["jointfrf", "identify", *map(str, LEVELS), "--each", *map(str, MODEL)]
+    agree(table[0].stdout.strip().split("\n\n")[0], shown)
 
 
 def test_each_test_has_files_of_its_own(table):

@@ -14,7 +14,6 @@ import pytest
 
 import jointfrf as jf
 from assembly_keys import assembly_page
-from command import run_command
 from documents import DOCUMENTS, README, ROOT, agree, blocks
 from jointfrf.assembly_file.keys import AssemblyKeys
 from jointfrf.cli.main import main
@@ -204,16 +203,6 @@ def test_assembly_of_the_page_on_fits_with_models_is_read():
 
 def test_the_page_of_the_keys_of_an_assembly_is_what_they_declare():
     assert DOCUMENTS["docs/assembly-keys.md"] == assembly_page()
-
-
-def test_the_table_of_the_shipped_beam_is_what_the_command_prints():
-    readme = DOCUMENTS["cases/lap-beam/README.md"]
-    (command,), (shown,) = blocks("sh", readme), blocks("text", readme)
-    words = command.replace("cases/lap-beam/level_*.uff", " ".join(map(str, sorted(ROOT.glob("cases/lap-beam/*.uff")))))
-    words = words.replace("cases/lap-beam/assembly.toml", str(ROOT / "cases" / "lap-beam" / "assembly.toml")).split()
-    result = run_command(*words[1:])
-    assert result.returncode == 0
-    agree(result.stdout.strip().split("\n\n")[0], shown)
 
 
 def test_python_of_the_page_on_the_engine_runs(capsys, monkeypatch, tmp_path, beams):

@@ -130,6 +130,7 @@ def lock_functions() -> str:
 
 
 @linux
+@pytest.mark.long  # they wait
 def test_of_several_that_wait_for_a_dead_one_one_goes_on(tmp_path):
     """All have seen that the holder is dead before the first of them takes the lock away."""
     gone = subprocess.Popen(["true"])
