@@ -49,6 +49,7 @@ def identified(tmp_path_factory):
     return run(*words), folder
 
 
+@pytest.mark.long
 def test_bending_plane_of_the_lap_joint(identified):
     result, folder = identified
     content = json.loads((folder / "identification.json").read_text())
@@ -311,6 +312,7 @@ def test_a_file_without_coordinates_and_a_spacing(tmp_path, beams):
     assert "damping left out" in cards
 
 
+@pytest.mark.long
 def test_the_noise_found_is_drawn(tmp_path):
     run(BARS, *JOINT_OF_BARS, "--method", "compliance", "--out", tmp_path)
     assert {path.name for path in tmp_path.iterdir()} >= {"noise_found.png", "noise_found.svg", "joint_y.png"}

@@ -45,6 +45,7 @@ def test_python_example_of_solid_bodies(capsys):
     assert len(found) >= 10
 
 
+@pytest.mark.long
 def test_python_of_the_page_on_fits_with_models_prints_what_it_shows(capsys):
     shown = blocks("text", DOCUMENTS["docs/model-fit.md"])
     for example, text in zip(blocks("python", DOCUMENTS["docs/model-fit.md"]), shown, strict=True):
@@ -52,6 +53,7 @@ def test_python_of_the_page_on_fits_with_models_prints_what_it_shows(capsys):
         agree(capsys.readouterr().out, text)
 
 
+@pytest.mark.long
 def test_the_page_on_levels_finds_the_joint_it_was_made_of(capsys, monkeypatch):
     page = DOCUMENTS["docs/levels.md"]
     (example,), (command, shown) = blocks("python", page), blocks("text", page)
@@ -74,6 +76,7 @@ def test_the_page_on_levels_finds_the_joint_it_was_made_of(capsys, monkeypatch):
         assert best.intervals[name][0] < true < best.intervals[name][1]
 
 
+@pytest.mark.long
 def test_the_page_on_planning_prints_what_it_shows(capsys, monkeypatch, tmp_path):
     page = DOCUMENTS["docs/planning.md"]
     command, *shown = blocks("text", page)

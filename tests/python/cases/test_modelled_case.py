@@ -21,6 +21,7 @@ def small_case(tmp_path, *changes):
     return folder
 
 
+@pytest.mark.long
 def test_a_case_gives_parameters_beside_their_bound(tmp_path):
     output = run_case(small_case(tmp_path), tmp_path / "out", realisations=2)
     parameters, stiffness, residual = output.tables

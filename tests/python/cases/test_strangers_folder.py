@@ -79,7 +79,7 @@ def test_a_link_in_the_folder_of_results_is_not_followed(tmp_path, monkeypatch):
     assert not list((tmp_path / "home").iterdir())
 
 
-def test_a_page_shows_no_text_of_another_folder(tmp_path):
+def test_a_page_shows_no_text_of_another_folder(tmp_path, without_pictures):
     """A README.md that is a link put any file of its reader on the page, which is then sent around."""
     (tmp_path / "key").write_text("secret of the reader")
     case = tmp_path / "case"

@@ -78,7 +78,9 @@ LOOKED_AT = {
 }
 
 
-@pytest.mark.parametrize("law", TRUE)
+@pytest.mark.parametrize(
+    "law", [law if law == "jenkins" else pytest.param(law, marks=pytest.mark.long) for law in TRUE]
+)
 def test_the_law_that_made_the_data_is_chosen_and_its_intervals_hold(law):
     a = np.geomspace(2e-7, 2e-5, 8)
     true = TRUE[law](a)

@@ -126,6 +126,7 @@ def test_preload_of_bolts():
             preload_force(*bad)
 
 
+@pytest.mark.long
 def test_static_state_of_the_case_study(default):
     tight, _ = default
     assert len(tight.lap.mesh.elements) == 3840

@@ -74,6 +74,7 @@ def test_noise_of_each_frf_goes_with_its_channel(measured):
     assert fit.std_error == pytest.approx(own.std_error, rel=1e-6)
 
 
+@pytest.mark.long
 def test_a_wrong_model_is_not_a_wrong_channel(measured):
     """Young's modulus 6 % off and not among the unknowns: no change is made but the true one."""
     wrong = assembly(BELIEVED, 1.06)

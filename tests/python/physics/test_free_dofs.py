@@ -30,7 +30,11 @@ def fits(joint, damping, level, count=12):
 
 @pytest.mark.parametrize(
     ("c", "damping", "level"),
-    [((20.0, 0.1), "viscous", 0.01), ((20.0, 0.1), "viscous", 0.05), ((0.0, 0.0), "none", 0.01)],
+    [
+        ((20.0, 0.1), "viscous", 0.01),
+        ((20.0, 0.1), "viscous", 0.05),
+        pytest.param((0.0, 0.0), "none", 0.01, marks=pytest.mark.long),
+    ],
 )
 def test_a_free_dof_is_found_and_bounded(c, damping, level):
     held = []
@@ -59,7 +63,7 @@ def test_a_soft_dof_is_not_free():
         assert 29.5 < high < 40
 
 
-@pytest.mark.parametrize("damping", ["viscous", "auto"])
+@pytest.mark.parametrize("damping", ["viscous", pytest.param("auto", marks=pytest.mark.long)])
 def test_a_hinge_has_both_bounds(damping):
     """Rigid in y and free in theta, as a pin with some friction: 1/k and k are zero in one fit."""
     exact = beams(jf.Joint([1e11, 0.0], [0.0, 0.1], DOFS))
@@ -80,7 +84,10 @@ def test_a_hinge_has_both_bounds(damping):
         assert fit.value["c_theta"] == pytest.approx(0.1, rel=0.01)
 
 
-@pytest.mark.parametrize(("damping", "seeds"), [("none", [(0.01, 0), (0.01, 1), (0.05, 1)]), ("viscous", [(0.01, 1)])])
+@pytest.mark.parametrize(
+    ("damping", "seeds"),
+    [pytest.param("none", [(0.01, 0), (0.01, 1), (0.05, 1)], marks=pytest.mark.long), ("viscous", [(0.01, 1)])],
+)
 def test_a_pin_without_damping_is_free(damping, seeds):
     """Nothing but noise is in gamma_jk of theta: no joint in compliances is near it, one in k of theta is."""
     exact, held = beams(jf.Joint([1e11, 0.0], [0.0, 0.0], DOFS)), []

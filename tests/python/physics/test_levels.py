@@ -53,7 +53,8 @@ def test_harmonic_balance_agrees_with_time_integration(freq_hz):
 
 
 @pytest.mark.parametrize(
-    ("control", "level"), [("joint", 5e-5), ("response", 4e-6), ("response", 5e-5), ("force", 3.0)]
+    ("control", "level"),
+    [("joint", 5e-5), ("response", 4e-6), ("response", 5e-5), pytest.param("force", 3.0, marks=pytest.mark.long)],
 )
 def test_stiffness_and_loss_factor_are_those_at_the_amplitude_found(beam, control, level):
     if control == "joint":

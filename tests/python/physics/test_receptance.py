@@ -407,6 +407,7 @@ def test_a_direct_solution_of_a_free_solid_at_0_hz_is_singular(free_beam, method
     np.testing.assert_allclose(seen[1:], h[1:], rtol=1e-9, atol=1e-9 * abs(h[1]).max())
 
 
+@pytest.mark.long
 def test_96_free_beams_are_singular_at_0_hz_however_they_are_solved():
     """Rounding leaves elimination a pivot of zero in most of them, one of 1e-18 of the others in some."""
     count = 0

@@ -148,6 +148,7 @@ def errors_of_each(found, freq, size):
             yield found.own[part, number], 1 + change * np.outer(np.eye(4)[p], np.eye(4)[q])
 
 
+@pytest.mark.long  # of gains with models below
 def test_covariance_at_the_joint_is_that_of_refits(h):
     """J Var J^T against a fit of its own for each error; differences of refits carry their curvature."""
     own = 1 + 0.001 * np.random.default_rng(3).standard_normal((4, 4))

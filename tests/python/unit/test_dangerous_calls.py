@@ -1,6 +1,7 @@
 """Every place of the package that starts a process, reads pickles, opens a socket or runs a text is known, with why."""
 
 import ast
+from functools import cache
 from pathlib import Path
 
 import jointfrf
@@ -89,6 +90,7 @@ def found_in(tree: ast.AST) -> set[str]:
     return found
 
 
+@cache
 def places() -> set[tuple[str, str]]:
     return {
         (file.relative_to(PACKAGE).as_posix(), what)

@@ -153,6 +153,7 @@ def test_errors_are_believed_as_far_as_they_are_not_excluded():
             jf.Substructure(own, ["1:y", "1:theta"], **wrong)
 
 
+@pytest.mark.long
 def test_intervals_allow_for_a_mesh_that_is_too_coarse_beyond_the_band():
     """Four elements for twelve: the first modes are right to 0.2 %, those beyond the band wrong by up to 30 %.
 
@@ -192,7 +193,13 @@ def test_no_error_is_found_in_models_that_are_right(exact):
 
 @pytest.mark.parametrize(
     ("wrong", "exact"),
-    [("modulus", True), ("modulus", False), ("mass", True), ("mass", False), ("large modulus", False)],
+    [
+        ("modulus", True),
+        ("modulus", False),
+        ("mass", True),
+        pytest.param("mass", False, marks=pytest.mark.long),
+        ("large modulus", False),
+    ],
 )
 def test_intervals_hold_where_the_model_is_wrong(wrong, exact):
     """E 0.3 or 3 % higher, 1 g more: a fit of exact models was off by ten of its standard errors, and more."""

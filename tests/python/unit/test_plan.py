@@ -224,7 +224,7 @@ def test_wrong_plans_at_the_joint_are_refused(change, message):
         jf.plan_joint_frfs(**arguments)
 
 
-@pytest.mark.parametrize("number", [3, 8])
+@pytest.mark.parametrize("number", [3, pytest.param(8, marks=pytest.mark.long)])
 def test_the_interval_of_the_next_assembly_is_as_wide_as_expected(number):
     rng = np.random.default_rng(number)
     widths = []

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -38,6 +39,7 @@ def room_of(module: str) -> str:
     return module.split(".")[1]
 
 
+@cache
 def imported_modules(file: Path) -> set[str]:
     """Modules of the package that a file imports, anywhere in it."""
     found: set[str] = set()
