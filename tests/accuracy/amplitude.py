@@ -7,7 +7,8 @@ that is drawn so, with the seed [7, 1000 l + i]; its noise has the seed 1000 l +
 
 amplitude [CONTROL...] [--draws N] [--levels NUMBER...]: joint (its relative rotation is held), response (the free end
 of B), force; alarms: linear tests that are called bent (draw i has the seed i); check: what `jf.check_frfs` calls bent,
-linear chains (seed [8, i] of chain i, i of its noise) and this beam under a force held (each tenth draw another beam).
+linear chains (seed [8, i] of chain i, i of its noise), these where as much noise of each force, common to all
+responses, comes to it (seed [9, i]), and this beam under a force held (each tenth draw another beam).
 """
 
 import argparse
@@ -65,7 +66,7 @@ def coverage(control: str, numbers: Iterable[int], draws: int) -> Iterator[str]:
             beam = truth(1000 * number + draw)
             steady, drive = measured(beam, control, level)
             h = jf.pollute(steady.h[:, :, None], NOISE, seed=1000 * number + draw)
-            fit = jf.identify_model(FREQ_HZ, h, believed(), CHANNELS, CHANNELS[:1])
+            fit = jf.identify_model(FREQ_HZ, h, believed(), CHANNELS, CHANNELS[:1], accept_bent=control == "force")
             try:
                 found = jf.levels([fit], [drive], laws=()).levels["theta_z"][0]
             except ValueError:
@@ -123,9 +124,11 @@ def chain(number: int) -> tuple[np.ndarray, np.ndarray]:
     return freq, own.receptance(freq)
 
 
-def bent(freq: np.ndarray, h: np.ndarray, noise: float, seed: int) -> bool:
-    """Return whether FRFs with noise are called bent without models."""
+def bent(freq: np.ndarray, h: np.ndarray, noise: float, seed: int, of_force: float = 0.0) -> bool:
+    """Return whether FRFs with noise, and with some of each force, are called bent without models."""
     own = jf.pollute(h, noise, seed=seed) if noise else h
+    size = np.random.default_rng([9, seed]).normal(size=(2, len(freq), 1, h.shape[2]), scale=of_force / np.sqrt(2))
+    own = own * (1 + size[0] + 1j * size[1])
     columns = range(h.shape[2])
     found = jf.check_frfs(freq, own, responses=[str(i) for i in range(h.shape[1])], forces=[str(i) for i in columns])
     return any(one.kind == "bent" for one in found.findings)
@@ -136,9 +139,10 @@ def checks(draws: int) -> Iterator[str]:
     freq, beams = np.arange(215.0, 255.0, 0.5), [truth(i) for i in range(-(-draws // 10))]
     states = {force: [beam.at_force(freq, force).h[:, :, None] for beam in beams] for force in BENDING}
     for noise in (0.0, 0.002, 0.01, 0.05):
-        linear = sum(bent(*chain(i), noise, i) for i in range(4 * draws))
+        linear = [sum(bent(*chain(i), noise, i, force) for i in range(4 * draws)) for force in (0.0, noise)]
         named = [sum(bent(freq, own[i // 10], noise, i) for i in range(draws)) for own in states.values()]
-        yield f"| {100 * noise:g} % | {linear} of {4 * draws} | {' | '.join(map(str, named))} |"
+        shown = " | ".join(f"{one} of {4 * draws}" for one in linear)
+        yield f"| {100 * noise:g} % | {shown} | {' | '.join(map(str, named))} |"
 
 
 def main() -> None:
@@ -154,7 +158,8 @@ def main() -> None:
             print("\n| noise | with models | at the joint |\n|---|---|---|", *alarms(args.draws), sep="\n")
             continue
         if control == "check":
-            print(f"\n| noise | linear | {' | '.join(f'{one:g} N' for one in BENDING)} |\n{'|---' * 8}|")
+            heads = ["noise", "linear", "and of the force", *(f"{one:g} N" for one in BENDING)]
+            print(f"\n| {' | '.join(heads)} |\n{'|---' * len(heads)}|")
             print(*checks(args.draws), sep="\n")
             continue
         names = ("held", "a, rad", "k, N m/rad", "eta", "+- k, %", "+- eta, %", "k inside, %", "eta inside, %",

@@ -140,7 +140,8 @@ def levels(
     Parameters
     ----------
     fits : sequence of Fit
-        One for each level, of `identify` or `identify_model`, as they were made (not loaded).
+        One for each level, of `identify` or `identify_model`, as they were made (not loaded); with `accept_bent` where
+        the amplitude changes over the lines, under a force held.
     drives : sequence of Drive
         What was held in each test.
     labels : sequence of str, optional
@@ -321,9 +322,10 @@ def _refitted(
 
 
 def _of_fit(one: _Followed, label: str) -> list[Finding]:
-    """Return what is in doubt of a fit, but for how K* goes with amplitude, which is no result."""
+    """Return what is in doubt of a fit, but for how K* goes with amplitude, which is followed and no result."""
     own = {each.name for each in one.fit.parameters if each.origin == "joint" and each.kind not in ("k", "h", "c", "m")}
-    said = [each for each in one.fit.findings if each.severity == "warning" and not own & set(each.about)]
+    said = [each for each in one.fit.findings
+            if each.severity == "warning" and each.kind != "bent" and not own & set(each.about)]  # fmt: skip
     return [replace(each, text=f"{label}: {each.text}") for each in said]
 
 

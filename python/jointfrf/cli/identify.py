@@ -11,6 +11,7 @@ from typing import Any, get_args
 import numpy as np
 
 from jointfrf.assembly_file.side_part import SidePart, read_side
+from jointfrf.channels.check.bent import refuse_bent
 from jointfrf.channels.check.check import warn_of_frfs
 from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.channels.point_lines import difference_error
@@ -108,6 +109,10 @@ def add_arguments(parser: CommandParser) -> None:
         "--common-gain LEVEL", "that of a gain which all FRFs share, as by one calibration of the hammer", float
     )
     parser.option(
+        "--accept-bent",
+        "fit FRFs that are bent by amplitude all the same, with a warning: they describe one test, not the structure",
+    )
+    parser.option(
         "--window-decay SIGMA", "exponential window exp(-SIGMA t) of the test, 1/s: taken off stiffnesses", float
     )
     parser.option(
@@ -171,7 +176,9 @@ def run(args: argparse.Namespace) -> int:
     sides = _sides(args, frfs, joint)
     request = card_request(args, joint.dofs, damping=damping, cross=args.cross, points=points)
     check = check_joint(joint, measured.quantity)
-    warn_of_frfs(check)
+    if not args.accept_bent:
+        refuse_bent(check.findings)
+    warn_of_frfs(check, bent="compliance" not in args.method)
     for text in joint.warnings(check):
         warnings.warn(text, FrfCheckWarning, stacklevel=2)
     if "compliance" not in args.method:
@@ -326,6 +333,7 @@ def _of_compliance(
         **known,
         "noise": args.noise,
         "setups": setups_with_gains(args, known["setups"], joint.h.shape),
+        "accept_bent": args.accept_bent,
         **({"window_decay": args.window_decay} if args.window_decay is not None else {}),
         **terms,
     }

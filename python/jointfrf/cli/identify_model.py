@@ -151,7 +151,8 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
     with waiting(f"fit of {file_names(args)}{getattr(args, 'turn', '')}"), warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
-        fit = measured.fit(noise=args.noise, find_wrong_channels=args.find_wrong_channels)
+        fit = measured.fit(noise=args.noise, find_wrong_channels=args.find_wrong_channels,
+                           accept_bent=args.accept_bent)  # fmt: skip
     source, written, text = file_names(args), list[Path](), ""
     if not args.each:
         out.say("", fit)

@@ -284,14 +284,15 @@ def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Driv
     if args.model is not None:
         measured = measured_assembly(args.model, frfs, bands=args.band)
         with waiting(f"fit of {test.path.name}"):
-            return measured.fit(noise=args.noise), drive
+            return measured.fit(noise=args.noise, accept_bent=True), drive
     joint = measured_joint(own, frfs)
     channels = [str(one) for one in joint.responses.channels]
     if drive.held == "response" and drive.channel not in channels:
         hint = did_you_mean(drive.channel, channels)
         raise UsageError(f"--held {drive.channel}: {test.path.name} has {', '.join(channels)} at the joint{hint}")
     with waiting(f"fit of {test.path.name}"):
-        fit = identify(frfs.freq_hz, joint.h, joint.dofs, args.band, noise=args.noise, **joint.known(frfs))
+        known = joint.known(frfs)
+        fit = identify(frfs.freq_hz, joint.h, joint.dofs, args.band, noise=args.noise, accept_bent=True, **known)
     if drive.held == "response" and isinstance(fit.data, FitData):
         drive = replace(drive, channel=fit.data.response_names[channels.index(drive.channel)])
     return fit, drive

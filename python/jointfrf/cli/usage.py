@@ -60,6 +60,7 @@ _WORDS = tuple(
         (r"\bwindow_decay\b", "--window-decay"),
         (r"^gamma ", "gamma, the FRFs between all joint DOFs, "),
         (r"\bgive models of these to identify_model\b", "name models of these by --model"),
+        (r"\baccept_bent=True\b", "--accept-bent"),
         (r"\(check_frfs\), at transform,", "(jointfrf check), at --at and --channels,"),
     )
 )

@@ -20,7 +20,7 @@ from jointfrf.identification.manifold.transforms import Transform, Transforms
 from jointfrf.identification.minimise import inverse_information
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["channel_names", "compliance_data", "information_shares", "line_compliance", "regenerated_frfs"]
+__all__ = ["as_pair", "channel_names", "compliance_data", "information_shares", "line_compliance", "regenerated_frfs"]
 
 #: Steps of the projection.
 _STEPS = 30
@@ -38,9 +38,8 @@ def compliance_data(
         fitted[:, group.dofs] &= group.used[:, None]
     # A level that was assumed has been replaced by that of the residual.
     scale = (found.noise_level / problem.noise.level) ** 2 if problem.noise.is_assumed else 1.0
-    # An `Interface` is a tuple, too.
-    pair = transform if isinstance(transform, tuple) and not isinstance(transform, Interface) else (transform,) * 2
-    names = channel_names(frfs, problem.dofs, (pair[0], pair[1]))
+    pair = as_pair(transform)
+    names = channel_names(frfs, problem.dofs, pair)
     return FitData(
         measured=frfs.measured,
         response_names=names[0],
@@ -59,6 +58,13 @@ def compliance_data(
         line_compliance=partial(line_compliance, found.estimate, frfs.n),
         information=partial(information_shares, found.estimate),
     )
+
+
+def as_pair(transform: Transform | tuple[Transform, Transform] | None) -> tuple[Transform | None, Transform | None]:
+    """Return the transforms of responses and of forces."""
+    # An `Interface` is a tuple, too.
+    pair = transform if isinstance(transform, tuple) and not isinstance(transform, Interface) else (transform,) * 2
+    return pair[0], pair[1]
 
 
 def _modes(frfs: InterfaceFrfs) -> tuple[FloatArray, FloatArray] | None:

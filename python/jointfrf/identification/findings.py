@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from jointfrf.channels.check.finding import FrfFinding
 from jointfrf.errors import ConvergenceWarning, IdentificationWarning
 
-__all__ = ["Finding", "FitFindingKind", "WithFindings", "as_warning", "note", "warn", "worst_first"]
+__all__ = ["Finding", "FitFindingKind", "WithFindings", "as_warning", "note", "of_bent_frfs", "warn", "worst_first"]
 
 #: What a finding is about.
 FitFindingKind = Literal[
@@ -104,6 +105,12 @@ def warn(
 def note(kind: FitFindingKind, text: str, about: tuple[str, ...] = ()) -> Finding:
     """Return a finding that says how numbers came about."""
     return Finding(kind, "note", text, about)
+
+
+def of_bent_frfs(found: Iterable[FrfFinding]) -> list[Finding]:
+    """Return the findings of a fit to FRFs that are bent by amplitude."""
+    return [warn("bent", f"{one.message}: the fit describes this test, not the structure; {one.remedy}", one.channels)
+            for one in found]  # fmt: skip
 
 
 def worst_first(findings: Sequence[Finding]) -> tuple[Finding, ...]:

@@ -9,13 +9,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jointfrf.channels.check.bent import bent_of_channels, refuse_bent
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
-from jointfrf.channels.check.finding import FrfCheck
+from jointfrf.channels.check.finding import FrfCheck, FrfFinding
 from jointfrf.frf.bands import spread_lines
 from jointfrf.frf.setups import SetUps
-from jointfrf.identification.compliance_data import compliance_data
+from jointfrf.identification.compliance_data import as_pair, channel_names, compliance_data
 from jointfrf.identification.describe import describe_laws, describe_springs
-from jointfrf.identification.findings import note
+from jointfrf.identification.findings import note, of_bent_frfs
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
 from jointfrf.identification.manifold.fit import fit_laws, fit_springs
 from jointfrf.identification.manifold.prepare import (
@@ -30,7 +31,7 @@ from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_measur
 from jointfrf.identification.profile import Intervals
 from jointfrf.identification.result import Fit
 from jointfrf.identification.side_models import SideModel
-from jointfrf.kernel.arguments import FloatArray, as_names, as_not_negative, check_type
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, as_not_negative, check_type
 from jointfrf.laws.law_joint import LawJoint
 
 __all__ = ["identify"]
@@ -54,6 +55,7 @@ def identify(
     reciprocal: bool = True,
     window_decay: float = 0.0,
     sides: tuple[SideModel, SideModel] | None = None,
+    accept_bent: bool = False,
 ) -> Fit:
     """Identify a joint from measured FRFs of the assembly between all its joint DOFs, without models.
 
@@ -106,6 +108,9 @@ def identify(
     sides : pair of SideModel, optional
         Models of both sides j and k, free of each other, that bend between channels and joint: the FRFs are corrected
         by them first, and what is not known of the models is in weights and intervals.
+    accept_bent : bool
+        Whether FRFs that are bent by amplitude, as those of no linear structure are, are fitted all the same: a finding
+        then names them. By default they are refused.
 
     Returns
     -------
@@ -114,7 +119,7 @@ def identify(
     Raises
     ------
     ValueError
-        Wrong shapes, names, bands; NaN or Inf in a line; FRFs that no joint fits.
+        Wrong shapes, names, bands; NaN or Inf in a line; FRFs that no joint fits, or that are bent by amplitude.
 
     Warns
     -----
@@ -168,12 +173,17 @@ def identify(
     if decay and joint is not None:
         raise ValueError("window_decay is taken off springs and dampers, not of laws: leave it out")
     options = FitOptions(damping or "auto", cross or "zero", reciprocal, equal)
+    measured = as_measured(freq_hz, gamma, square=False)
     problem = prepare_compliance(
-        as_measured(freq_hz, gamma, square=False), dofs, bands, transform,
+        measured, dofs, bands, transform,
         NoiseOptions(noise, coherence, averages, setups=setups), options, _check_sides(sides),
     )  # fmt: skip
-    if reciprocal:
-        _look_at(problem, transform)
+    check_type("accept_bent", accept_bent, bool)
+    # Models of sides have corrected those of the problem.
+    raw = None if sides is None else measured.h[np.isin(measured.freq_hz, problem.freq_hz)]
+    bent = _look_at(problem, transform, raw)
+    if not accept_bent:
+        refuse_bent(bent)
     if joint is None:
         found = fit_springs(problem)
         fit = describe_springs(found, problem)
@@ -186,6 +196,7 @@ def identify(
         found = fit_laws(problem, joint)
         fit = describe_laws(found, joint)
     fit = replace(fit, data=compliance_data(found, problem, transform))
+    fit = fit.with_findings([*fit.findings, *of_bent_frfs(bent)])
     fit.issue_warnings()
     return fit
 
@@ -200,10 +211,20 @@ def _check_sides(sides: tuple[SideModel, SideModel] | None) -> tuple[SideModel, 
     return sides[0], sides[1]
 
 
-def _look_at(problem: FitProblem, transform: Transform | tuple[Transform, Transform] | None) -> None:
-    """Warn of FRFs that look wrong."""
-    transforms = None if transform is None else (problem.frfs.responses, problem.frfs.forces)
-    warn_of_frfs(_checked(MeasuredFrfs(problem.freq_hz, problem.frfs.measured), problem.dofs, transforms), 3)
+def _look_at(
+    problem: FitProblem, transform: Transform | tuple[Transform, Transform] | None, raw: ComplexArray | None
+) -> list[FrfFinding]:
+    """Warn of FRFs that look wrong; return what is bent by amplitude: of `raw` ones where models corrected them."""
+    h = problem.frfs.measured if raw is None else raw
+    if problem.options.reciprocal:
+        transforms = None if transform is None else (problem.frfs.responses, problem.frfs.forces)
+        check = _checked(MeasuredFrfs(problem.freq_hz, problem.frfs.measured), problem.dofs, transforms)
+        warn_of_frfs(check, 3)
+        if raw is None and all(one.kind != "bent" for one in check.findings):
+            return []
+    # by the names of the channels
+    names = channel_names(problem.frfs, problem.dofs, as_pair(transform))
+    return bent_of_channels(problem.freq_hz, h, *names)
 
 
 def _checked(

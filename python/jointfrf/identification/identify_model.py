@@ -9,8 +9,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from jointfrf.channels.check.bent import bent_of_channels, refuse_bent
 from jointfrf.frf.setups import SetUps
 from jointfrf.identification.describe import describe_model
+from jointfrf.identification.findings import of_bent_frfs
 from jointfrf.identification.identify import identify
 from jointfrf.identification.manifold.coordinates import CrossTerms
 from jointfrf.identification.model.assembly import Assembly
@@ -42,6 +44,7 @@ def identify_model(
     averages: float | None = None,
     setups: SetUps | None = None,
     find_wrong_channels: bool = False,
+    accept_bent: bool = False,
 ) -> Fit:
     """Identify a joint from any measured FRFs of the assembly, given its substructures as models or FRFs.
 
@@ -73,6 +76,9 @@ def identify_model(
         Whether to look for one channel of the opposite sign, or two exchanged ones of the same quantity, with which the
         models fit the FRFs far better. A warning names what was found and that the fit takes it so; where two changes
         fit alike both are named and none is made.
+    accept_bent : bool
+        Whether FRFs that are bent by amplitude, as those of no linear structure are, are fitted all the same: a finding
+        then names them. By default they are refused; `levels` takes fits to them.
 
     Returns
     -------
@@ -82,7 +88,8 @@ def identify_model(
     Raises
     ------
     ValueError
-        Wrong shapes or names; NaN or Inf in a line; an unknown that there is not; fewer numbers than unknowns.
+        Wrong shapes or names; NaN or Inf in a line; an unknown that there is not; fewer numbers than unknowns; FRFs
+        that are bent by amplitude.
     SingularLineError
         An undamped substructure resonates at a line.
 
@@ -134,14 +141,17 @@ def identify_model(
     channels = Channels(*named, dict(response_gains or {}), dict(force_gains or {}))
     known = NoiseOptions(noise, coherence, averages, setups=setups)
     problem = prepare_model_fit(freq_hz, h, assembly, channels, known, fixed, _springs_at_joint)
+    check_type("accept_bent", accept_bent, bool)
+    bent = bent_of_channels(problem.freq_hz, problem.measured, channels.responses, channels.forces)
+    if not accept_bent:
+        refuse_bent(bent)
     search = find_channel_change(problem, channels) if find_wrong_channels else None
     if search is not None and search.change is not None:
         lines = search.change.of(as_lines("h", h))
         known = _changed(known, search.change)
         problem = prepare_model_fit(freq_hz, lines, assembly, channels, known, fixed, _springs_at_joint)
     fit = describe_model(fit_assembly(problem), channels)
-    if search is not None:
-        fit = fit.with_findings([*fit.findings, search.finding])
+    fit = fit.with_findings([*fit.findings, *([] if search is None else [search.finding]), *of_bent_frfs(bent)])
     fit.issue_warnings()
     return fit
 
@@ -175,7 +185,9 @@ def _springs_at_joint(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            found = identify(freq_hz, gamma, joint.dofs, damping="viscous", cross=cross, noise=variance)
+            found = identify(
+                freq_hz, gamma, joint.dofs, damping="viscous", cross=cross, noise=variance, accept_bent=True
+            )
         except (ValueError, np.linalg.LinAlgError):
             return None
     k, c = found.stiffness_matrix, found.damping_matrix

@@ -30,9 +30,9 @@ def beam():
     return iwan_beam(Sliders.iwan(*IWAN), youngs_modulus=(1.004 * 210e9, 0.998 * 210e9), loss_factor=0.0012)
 
 
-def fitted(h, noise=0.01, seed=1):
+def fitted(h, noise=0.01, seed=1, **options):
     measured = jf.pollute(h[:, :, None], noise, seed=seed)
-    return jf.identify_model(FREQ_HZ, measured, believed(), CHANNELS, CHANNELS[:1])
+    return jf.identify_model(FREQ_HZ, measured, believed(), CHANNELS, CHANNELS[:1], **options)
 
 
 def test_sliders_have_the_first_harmonic_of_the_formula():
@@ -66,7 +66,11 @@ def test_stiffness_and_loss_factor_are_those_at_the_amplitude_found(beam, contro
         steady, drive = beam.at_response(FREQ_HZ, 3, level), jf.Drive("response", level, "B/25:y")
     else:
         steady, drive = beam.at_force(FREQ_HZ, level), jf.Drive("force", level)
-    found = jf.levels([fitted(steady.h)], [drive], laws=())
+    # under a force held the resonance is bent: nothing else is refused
+    fit = fitted(steady.h, accept_bent=control == "force")
+    assert ("bent" in [each.kind for each in fit.findings]) == (control == "force")
+    found = jf.levels([fit], [drive], laws=())
+    assert "bent" not in [each.kind for each in found.findings]
     (one,) = found.levels["theta_z"]
     true = beam.joint.first_harmonic(np.array([one.amplitude]))[0]
     assert steady.joint.min() < one.amplitude * 1.01
@@ -121,6 +125,55 @@ def test_frfs_at_the_joint_that_are_bent_by_amplitude_are_refused():
     assert list(found.refused) == ["high"]
     assert [one.label for one in found.levels["x"]] == ["low"]
     assert found.findings[0].kind == "bent"
+
+
+@pytest.fixture(scope="module")
+def of_two_springs():
+    """FRFs at both ends of two springs whose stiffness falls with their motion under 1 N, and of two linear ones."""
+    freq, k = np.linspace(0.5, 5, 400), 2000 * (1 + 0.02j)
+    a = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start").receptance(freq)
+    b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end").receptance(freq)
+    linear = jf.couple(a, b, np.broadcast_to(k * np.eye(2), (freq.size, 2, 2)), [0, 1], [0, 1])
+    h = linear.copy()
+    for column in range(4):
+        for _ in range(100):
+            motion = abs(h[:, :2, column] - h[:, 2:, column])
+            moved = k / (1 + motion / 0.02)
+            h[:, :, column] = jf.couple(a, b, moved[:, :, None] * np.eye(2), [0, 1], [0, 1])[:, :, column]
+    return freq, jf.pollute(h, 0.01, seed=2), jf.pollute(linear, 0.01, seed=2)
+
+
+@pytest.mark.parametrize("named", [False, True])
+@pytest.mark.parametrize("reciprocal", [False, True])
+def test_bent_frfs_at_the_joint_are_refused_unless_they_are_accepted(of_two_springs, named, reciprocal):
+    freq, h, linear = of_two_springs
+    options = {"transform": (np.eye(4), np.eye(4) + 1e-12)} if named else {}
+    name = "force 0" if named else "j:x"
+    with pytest.raises(ValueError, match=rf"{name} are bent by amplitude: the resonance.*accept_bent=True"):
+        jf.identify(freq, h, ["x", "y"], reciprocal=reciprocal, **options)
+    fit = jf.identify(freq, h, ["x", "y"], reciprocal=reciprocal, accept_bent=True, **options)
+    assert fit.findings[0].kind == "bent"
+    assert fit.findings[0].severity == "warning"
+    whole = jf.identify(freq, linear, ["x", "y"], reciprocal=reciprocal, **options)
+    assert "bent" not in [each.kind for each in whole.findings]
+
+
+def test_bent_frfs_of_channels_are_refused_unless_they_are_accepted(believed_beam):
+    freq = np.arange(215.0, 255.0, 0.5)
+    h = jf.pollute(believed_beam[0].at_force(freq, 1.0).h[:, :, None], 0.01, seed=3)
+    words = (
+        r"FRFs of force A/1:y are bent by amplitude: the resonance at 23\d\.?\d* Hz \(2\d\d.* Hz\) moves by -\d.* Hz "
+        r"while the motion grows .* times \(chance .*\): no linear .*; measure at a lower level or with the motion "
+        r"held \(response control\), .*; jointfrf levels finds .*; accept_bent=True fits it all the same$"
+    )
+    with pytest.raises(ValueError, match=words):
+        jf.identify_model(freq, h, believed(), CHANNELS, CHANNELS[:1])
+    with pytest.raises(TypeError, match="accept_bent must be a bool"):
+        jf.identify_model(freq, h, believed(), CHANNELS, CHANNELS[:1], accept_bent="yes")
+    with pytest.warns(jf.IdentificationWarning, match="A/1:y are bent by amplitude.*: the fit describes this test"):
+        fit = jf.identify_model(freq, h, believed(), CHANNELS, CHANNELS[:1], accept_bent=True)
+    assert fit.findings[0].kind == "bent"
+    assert fit.findings[0].about == ("force A/1:y",)
 
 
 def test_the_check_names_resonances_that_move_with_their_motion(believed_beam):
@@ -248,6 +301,38 @@ def test_a_backbone_that_does_not_fit_its_assembly_is_an_error(believed_beam):
     # a mode that is stiffer than with a rigid joint
     stiff = jf.backbone_levels(whole, jf.Backbone("A/1:y", [330.0], [1e-5], damping=[0.001]), laws=())
     assert "not positive" in stiff.warnings[0]
+
+
+@pytest.mark.filterwarnings("always::jointfrf.FrfCheckWarning")
+def test_the_command_refuses_bent_frfs_unless_they_are_accepted(believed_beam, of_two_springs, capsys, tmp_path):
+    freq = np.arange(215.0, 255.0, 0.5)
+    h = jf.pollute(believed_beam[0].at_force(freq, 1.0).h[:, :, None], 0.01, seed=3)
+    channels = tuple(jf.io.Channel(node, "+y") for node in (11, 12, 21, 22))
+    write_frfs(tmp_path / "beam.npz", jf.io.FrfSet(freq, channels, channels[:1], h, "receptance"))
+    channels = tuple(jf.io.Channel(node, axis) for node in (1, 2) for axis in ("+x", "+y"))
+    write_frfs(tmp_path / "joint.npz", jf.io.FrfSet(of_two_springs[0], channels, channels, of_two_springs[1]))
+    for file, words, name in (
+        ("beam.npz", ["--model", str(CASE / "assembly.toml")], "A/1:y"),
+        ("joint.npz", ["--j", "1", "--k", "2", "--dofs", "x,y"], "1:+x"),
+        ("joint.npz", ["--j", "1", "--k", "2", "--dofs", "x,y", "--method", "inverse-substructuring"], "1:+x"),
+    ):
+        words = ["identify", str(tmp_path / file), *words, "--save", str(tmp_path / "found.json")]
+        assert main(words) == 1
+        shown = capsys.readouterr().err
+        assert f"error: FRFs of force {name} are bent by amplitude" in shown
+        assert "jointfrf levels" in shown
+        assert "--accept-bent fits it all the same" in shown
+        assert not (tmp_path / "found.json").exists()
+        assert main([*words, "--accept-bent"]) == 0
+        assert "are bent by amplitude" in "".join(capsys.readouterr())
+        (tmp_path / "found.json").unlink()
+    # levels follows the amplitude
+    h = jf.pollute(believed_beam[0].at_force(FREQ_HZ, 0.5).h[:, :, None], 0.01, seed=3)
+    channels = tuple(jf.io.Channel(node, "+y") for node in (11, 12, 21, 22))
+    write_frfs(tmp_path / "beam.npz", jf.io.FrfSet(FREQ_HZ, channels, channels[:1], h, "receptance"))
+    words = ["levels", str(tmp_path / "beam.npz"), "--level", "0.5", "--model", str(CASE / "assembly.toml"), "--json"]
+    assert main([*words, "--laws", "power"]) == 0
+    assert not any("describes this test" in one for one in json.loads(capsys.readouterr().out)["warnings"])
 
 
 def test_the_command_reads_a_backbone(capsys, tmp_path):

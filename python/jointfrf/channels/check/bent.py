@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from jointfrf.channels.check.finding import FrfFinding
-from jointfrf.channels.check.signals import Measurement
+from jointfrf.channels.check.signals import LEAST_LINES, Measurement, as_measurement, check_signals
+from jointfrf.frf.bands import spread_lines
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
-__all__ = ["bent_findings"]
+__all__ = ["bent_findings", "bent_of_channels", "refuse_bent"]
 
 #: Powers of 1 / (f - z) of a pole alone, and of each of two, for further ones close by; powers of f, for all others.
 _ALONE, _TOGETHER, _POWERS = 3, 2, 4
@@ -25,12 +26,17 @@ _PEAKS, _RESPONSES, _LEAST = 10, 8, 3
 #: Steps of the search for the pole, and relative change at which it is found.
 _STEPS, _FOUND = 15, 1e-6
 #: Chance, divided by the number of peaks, and shift in half bandwidths from which a resonance is called bent: less
-#: hardly changes the FRF, and other modes that the powers do not quite describe reach 0.1.
-_CHANCE, _SHIFT = 1e-4, 0.3
+#: hardly changes the FRF, other modes that the powers do not quite describe reach 0.1, and 2 % of noise of the force
+#: that goes on over five lines 0.7.
+_CHANCE, _SHIFT = 1e-4, 0.75
+#: Powers of ln a, and of 1 / (f - z), that a pole has beside those of first order where it moves far.
+_FURTHER = ((2, 2), (2, 3), (3, 2), (3, 4))
 #: Chance below which responses agree on the shift: noise that goes on over many lines is not common to all.
 _AGREE = 1e-3
 #: Lines whose residual is so many times the median are left out: of noise one in 10^15 is.
 _OUTLYING = 6.0
+#: Forces whose FRFs are described where a fit is refused.
+_DESCRIBED = 2
 
 
 class _Peak(NamedTuple):
@@ -42,6 +48,33 @@ class _Peak(NamedTuple):
     span: float
 
 
+def bent_of_channels(
+    freq_hz: FloatArray, h: ComplexArray, responses: Sequence[str], forces: Sequence[str]
+) -> list[FrfFinding]:
+    """Return what `bent_findings` finds in FRFs of shape (n_freq, n_responses, n_forces), NaN where not measured.
+
+    Dead and doubled channels are left out, and many lines thinned.
+    """
+    some = spread_lines(freq_hz.size)
+    if freq_hz[some].size < LEAST_LINES:
+        return []
+    m = as_measurement(freq_hz[some], h[some], responses, forces, np.asarray(np.isnan(h).all(axis=0)))
+    signals = check_signals(m)
+    return list(bent_findings(m, set(signals.rows), set(signals.columns)))
+
+
+def refuse_bent(findings: Sequence[FrfFinding]) -> None:
+    """Raise ValueError where FRFs are bent by amplitude: a linear fit would describe one test, not the structure."""
+    bent = [one for one in findings if one.kind == "bent"]
+    if bent:
+        said = "; ".join(one.message for one in bent[:_DESCRIBED])
+        more = f"; so are those of {len(bent) - _DESCRIBED} more forces" if bent[_DESCRIBED:] else ""
+        raise ValueError(
+            f"{said}{more}: no linear structure, to which a joint could be fitted; {bent[0].remedy}; accept_bent=True "
+            "fits it all the same"
+        )
+
+
 def bent_findings(m: Measurement, rows: set[int], columns: set[int]) -> Iterator[FrfFinding]:
     """Yield a finding for each force whose FRFs are bent, of channels that are not left out.
 
@@ -50,33 +83,35 @@ def bent_findings(m: Measurement, rows: set[int], columns: set[int]) -> Iterator
     the line: ln a of a resonance is half of ln(f - z) + ln(f - z*), of which the second has its branch in the half
     plane where no causal system has anything. So the residual is projected on c_p ln a / (f - z)^2, less what all
     powers of each response explain of it, and the common g is tested: by F, and by the scatter of each line (HC3), as
-    noise may go with the FRF, both widened by the correlation from line to line. The largest chance counts, that beside
-    a second pole, too; and the responses must agree, by their scatter.
+    noise may go with the FRF, both widened by the correlation from line to line. Noise of the force is that of all
+    responses, so that a line is one number: what scatters beside further powers of ln a is tested, too. The largest
+    chance counts, that beside a second pole, too; and the responses must agree, by their scatter.
     """
     kept = [i for i in range(len(m.responses)) if i not in rows]
-    looked, found = 0, []
-    for column in (i for i in range(len(m.forces)) if i not in columns):
-        for line, peak in _peaks(m.freq_hz, m.h[:, kept, column]):
-            looked += 1
-            found.append((column, float(m.freq_hz[line]), peak))
+    found = [
+        (column, m.freq_hz[lines], peak)
+        for column in (i for i in range(len(m.forces)) if i not in columns)
+        for lines, peak in _peaks(m.freq_hz, m.h[:, kept, column])
+    ]
+    looked = len(found)
     bent = [one for one in found if one[2].chance * looked < _CHANCE and abs(one[2].shift) > _SHIFT]
     for column in dict.fromkeys(one[0] for one in bent):
-        _, freq, worst = min((one for one in bent if one[0] == column), key=lambda one: one[2].chance)
+        _, (freq, low, high), worst = min((one for one in bent if one[0] == column), key=lambda one: one[2].chance)
         others = sum(one[0] == column for one in bent) - 1
         more = f", and {others} more resonance{'s' * (others > 1)}" if others else ""
         name = f"force {m.forces[column]}"
         yield FrfFinding(
             "bent", "warning", (name,), float(abs(worst.shift)), _SHIFT,
-            f"FRFs of {name} are bent by amplitude: the resonance at {freq:.4g} Hz moves by {worst.hertz.real:+.2g} Hz "
-            f"while the motion grows {np.exp(worst.span):.2g} times (chance of a linear structure "
-            f"{worst.chance * looked:.1g}){more}",
-            "measure at a lower level or with the motion held, or leave these lines out; jointfrf levels finds "
-            "stiffness and damping over amplitude",
+            f"FRFs of {name} are bent by amplitude: the resonance at {freq:.4g} Hz ({low:.4g} to {high:.4g} Hz) moves "
+            f"by {worst.hertz.real:+.2g} Hz while the motion grows {np.exp(worst.span):.2g} times (chance of a linear "
+            f"structure {worst.chance * looked:.1g}){more}",
+            "measure at a lower level or with the motion held (response control), or leave these lines out; jointfrf "
+            "levels finds stiffness and damping over amplitude",
         )  # fmt: skip
 
 
-def _peaks(freq_hz: FloatArray, h: ComplexArray) -> Iterator[tuple[int, _Peak]]:
-    """Yield the line of each peak of the FRFs of a force, shape (n_freq, n), and what was found there."""
+def _peaks(freq_hz: FloatArray, h: ComplexArray) -> Iterator[tuple[list[int], _Peak]]:
+    """Yield line, first and last line of each peak of the FRFs of a force, shape (n_freq, n), and what is found."""
     usual = np.median(abs(h), axis=0)
     h = h[:, usual > 0]
     if h.shape[1] < _LEAST:
@@ -92,7 +127,7 @@ def _peaks(freq_hz: FloatArray, h: ComplexArray) -> Iterator[tuple[int, _Peak]]:
         largest = np.argsort(-abs(there).max(axis=0) / np.maximum(np.median(abs(h), axis=0), TINY))[:_RESPONSES]
         peak = _look(freq_hz[own], there[:, largest])
         if peak is not None:
-            yield line, peak
+            yield [line, own.start, own.stop - 1], peak
 
 
 def _reach(size: FloatArray) -> int:
@@ -159,10 +194,26 @@ def _moved(
     known = np.maximum(1 - np.sum(abs(q) ** 2, axis=1), 1 / len(x))[:, None]
     scatter = max(float(np.sum(abs(g * rest / known) ** 2)), TINY)
     chances.append(_tail(abs(slope * information) ** 2 / scatter / wider, degrees))
+    size = float(np.linalg.norm(residues[0]))
+    chances.append(_of_lines(left @ residues[0].conj() / size, log, x - poles[0], q))
     scatter = max(float(np.sum(abs(np.sum(g.conj() * rest, axis=0)) ** 2)), TINY)
     agree = _tail(abs(slope * information) ** 2 / scatter, h.shape[1] - 1)
     span = float(-log.min())
     return _Peak(max(chances) if agree < _AGREE else 1.0, slope * span, slope * span / poles[0].imag, span), left
+
+
+def _of_lines(left: ComplexArray, log: FloatArray, from_pole: ComplexArray, q: ComplexArray) -> float:
+    """Return the chance of what is left along the mode, one number a line, without a pole that moves."""
+    columns = np.stack([log**i / from_pole**k for i, k in ((1, 2), *_FURTHER)], axis=1)
+    columns -= q @ (q.conj().T @ columns)
+    own = np.linalg.qr(columns)[0]
+    noise = left - own @ (own.conj().T @ left)
+    correlation = float(np.vdot(noise[:-1], noise[1:]).real) / max(float(np.vdot(noise, noise).real), TINY)
+    wider = max((1 + correlation) / max(1 - correlation, TINY), 1.0)
+    known = np.maximum(1 - np.sum(abs(q) ** 2, axis=1), 1 / len(left))
+    scatter = max(float(np.sum(abs(columns[:, 0] * noise / known) ** 2)), TINY)
+    degrees = max((len(left) - q.shape[1] - own.shape[1]) / wider, 1.0)
+    return _tail(float(abs(np.vdot(columns[:, 0], left))) ** 2 / scatter / wider, degrees)
 
 
 def _tail(value: float, degrees: float) -> float:

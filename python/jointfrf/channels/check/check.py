@@ -43,6 +43,7 @@ from jointfrf.channels.check.rigid_findings import rigid_faults
 from jointfrf.channels.check.rigid_motion import ChannelGroup, not_rigid
 from jointfrf.channels.check.sides import reference_findings, side_findings
 from jointfrf.channels.check.signals import (
+    LEAST_LINES,
     Measurement,
     as_channel_names,
     as_measurement,
@@ -67,8 +68,6 @@ from jointfrf.spelling import some_of
 __all__ = ["check_frfs", "warn_of_frfs"]
 
 FrfFix = Literal["lines", "time-convention", "exchanged", "quantity", "sign", "units", "gain", "delay"]
-#: From fewer lines the noise cannot be estimated.
-_LEAST_LINES = 20
 #: Share of FRFs that run backwards from which all are conjugated.
 _BACKWARDS = 0.8
 #: Relative noise of channels that may hide small FRFs of joint DOFs, which are differences of large ones.
@@ -179,7 +178,7 @@ def check_frfs(
     measurement = as_measurement(freq[good], lines[good], rows, columns, missing)
     state = _Progress(measurement, 1 if blame == "responses" else 2, read_as)
     state.findings.extend([*_missing_findings(missing, joint, *labels), *found])
-    if measurement.freq_hz.size >= _LEAST_LINES and measurement.h.size:
+    if measurement.freq_hz.size >= LEAST_LINES and measurement.h.size:
         _check_signals(state)
         unspoilt = None
         if joint is not None:
@@ -195,10 +194,10 @@ def check_frfs(
     return _result(state, freq, lines, good, fix)
 
 
-def warn_of_frfs(check: FrfCheck, stacklevel: int = 2) -> None:
-    """Issue a `FrfCheckWarning` for each error and warning of a check."""
+def warn_of_frfs(check: FrfCheck, stacklevel: int = 2, *, bent: bool = False) -> None:
+    """Issue a `FrfCheckWarning` for each error and warning of a check; of bent FRFs, which fits refuse, if asked."""
     for finding in check.findings:
-        if finding.level != "note":
+        if finding.level != "note" and (bent or finding.kind != "bent"):
             warnings.warn(str(finding), FrfCheckWarning, stacklevel=stacklevel + 1)
 
 

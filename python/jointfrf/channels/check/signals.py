@@ -15,6 +15,7 @@ from jointfrf.frf.frf_set import Channel
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray, one_line
 
 __all__ = [
+    "LEAST_LINES",
     "LEAST_SMOOTHNESS",
     "Measurement",
     "as_channel_names",
@@ -24,6 +25,8 @@ __all__ = [
     "modulus",
 ]
 
+#: From fewer lines the noise cannot be estimated.
+LEAST_LINES = 20
 #: Below this agreement of the phase from line to line an FRF is noise.
 LEAST_SMOOTHNESS = 0.3
 #: Of few lines the phases of noise agree by more: by less than this over the root of their number.
