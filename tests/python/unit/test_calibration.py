@@ -181,6 +181,14 @@ def test_covariance_with_models_is_that_of_refits(between_points):
     np.testing.assert_allclose(np.sqrt(np.diag(covariance)), np.sqrt(np.diag(total)), rtol=0.1)
 
 
+def test_the_residual_of_a_fit_with_models_allows_for_gains(between_points):
+    """A residual of gains of 0.5 % is more than twice the noise, and no reason to doubt the models."""
+    freq, measured = FREQ[::4], noisy(between_points * gains(1), seed=1)[::4]
+    fit = jf.identify_model(freq, measured, assembly(exact=True), CHANNELS, CHANNELS)
+    assert any(one.kind == "calibration" for one in fit.findings)
+    assert fit.residual_is_noise
+
+
 def test_intervals_allow_for_gains_and_say_so(h):
     fits = {}
     for name, factor in (("exact", 1.0), ("off", gains(5))):

@@ -211,6 +211,28 @@ def test_points_of_a_part_whose_lengths_are_scaled(model, coupling):
     np.testing.assert_allclose(scaled.places["tip"], larger.places["tip"], atol=1e-12)
 
 
+@pytest.mark.parametrize("count", [2, 3])
+def test_rotations_of_nodes_hold_a_distributing_point_where_translations_cannot(count):
+    """The nearest rigid motion, Q u, of translations alone from three nodes on, and so Q H Q^T; H by its definition."""
+    at = np.array([[0.0, 0.0, 0.0], [0.2, 0.01, 0.0], [0.1, 0.15, 0.03]])[:count]
+    directions = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
+    dofs = tuple(f"{node}:{direction}" for node in range(1, count + 1) for direction in directions)
+    root = np.random.default_rng(count).standard_normal((2, len(dofs), len(dofs)))
+    k, m = (one @ one.T + len(dofs) * np.eye(len(dofs)) for one in root)
+    places = {str(node + 1): place for node, place in enumerate(at)}
+    patch = PointPatch("p", tuple(places), "distributing")
+    found = couple_points(PointModel(k, m, dofs=dofs, places=places), [patch])
+    motion = np.array([[[*unit, *np.cross(np.eye(3), r - at.mean(axis=0)) @ unit] for unit in np.eye(3)] for r in at])
+    turning = np.broadcast_to(np.eye(6)[3:], (count, 3, 6))
+    seen = motion if count > 2 else np.concatenate([motion, turning], axis=1)
+    nearest = np.zeros((6, count, 6))
+    nearest[:, :, : seen.shape[1]] = np.linalg.pinv(seen.reshape(-1, 6)).reshape(6, count, -1)
+    nearest = nearest.reshape(6, -1)
+    names = [f"p:{direction}" for direction in directions]
+    exact = nearest @ np.linalg.inv(k - (2 * np.pi * 0.1) ** 2 * m) @ nearest.T
+    np.testing.assert_allclose(found.receptance([0.1], names)[0], exact, rtol=1e-9, atol=1e-12)
+
+
 def test_a_node_in_two_rigid_points(model):
     nodes = end_nodes(model, 0.0)
     with pytest.raises(ValueError, match="follows both a and b"):
