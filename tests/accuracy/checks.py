@@ -1,6 +1,6 @@
 """How often `jf.check_frfs` finds errors of channels, and how often it finds some where there are none.
 
-.venv/bin/python tests/accuracy/checks.py [--seeds N] [--false-seeds N] [--jobs N] [--only channels | points]
+checks [--seeds N] [--false-seeds N] [--jobs N] [--only channels | points]
 
 Prints the tables of docs/checks.md in Markdown: of channels that are joint DOFs, seeds 0 to N - 1 of numpy's generator,
 together with the kind of noise; and of virtual points (`simulated_tests`), seeds from 1000 for faults, from 2000 for

@@ -66,7 +66,7 @@ def main() -> None:
     for row, one in enumerate(round_robins()):
         (mean, spread, ahead), (of_mean, of_next) = coverage(one, row, draws)
         print(f"| {one.assemblies} x {one.tests} | {100 * one.between:g}, {100 * one.within:g} | {mean:.1f} | "
-              f"{spread:.1f} | {ahead:.1f} | {of_mean:.2g}, {of_next:.2g} |", flush=True)  # fmt: skip
+              f"{spread:.1f} | {ahead:.1f} | {of_mean:.2g}, {float(f'{of_next:.2g}'):g} |", flush=True)  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """README and docs are true: their Python runs, their commands give the output shown, and links lead somewhere."""
 
+import ast
 import os
 import re
 import shlex
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tables import marked, tables_printed, written
 
 import jointfrf as jf
 from assembly_keys import assembly_page
@@ -87,6 +89,50 @@ def test_the_page_on_levels_shows_what_is_said_of_bent_frfs(capsys, monkeypatch,
     monkeypatch.chdir(ROOT)
     assert main(command.replace("force_1N.uff", str(tmp_path / "force_1N.uff")).split()) == 1
     agree(capsys.readouterr().err, " ".join(expected.split()))
+
+
+def cells_printed(path):
+    """Patterns of the texts of a program between the bars of its tables."""
+    for one in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        parts = one.values if isinstance(one, ast.JoinedStr) else [one]
+        texts = [part.value if isinstance(part, ast.Constant) else None for part in parts]
+        if any(isinstance(text, str) and text.strip(" |") for text in texts):
+            # what stands for a value is one word, or two
+            whole = "".join("\0" if text is None else str(text) for text in texts)
+            for cell in re.split(r"[|\n]", whole):
+                if cell.strip("\0 "):
+                    yield re.escape(cell.strip()).replace("\0", r"[^\s|]+(?: [^\s|]+)?")
+
+
+@pytest.mark.parametrize("name", ["docs/accuracy.md", "docs/checks.md"])
+def test_tables_of_studies_have_the_heads_that_these_print(name):
+    page, folder = DOCUMENTS[name], ROOT / "tests" / "accuracy"
+    found = list(marked(page))
+    assert len(found) == page.count("<!-- table") == page.count("<!-- /table -->") > 2
+    known = (folder / "run").read_text(encoding="utf-8")
+    for one in found:
+        study = one.words.split()[0]
+        module = folder / f"{study.replace('-', '_')}.py"
+        if module.exists():
+            assert re.search(rf"^{re.escape(study)}\)|[ |]{re.escape(study)}[ )]", known, re.MULTILINE), study
+        else:  # a part of the study of the compliance fit
+            assert f'"{study}": ' in (folder / "trials.py").read_text(encoding="utf-8")
+            module = folder / "fits.py"
+        head, line, *rows = one.table.splitlines()
+        # what columns are of may stand in a module that it imports
+        imported = re.findall(r"^from (\w+) import", module.read_text(encoding="utf-8"), re.MULTILINE)
+        sources = [module, *(path for other in imported if (path := folder / f"{other}.py").exists())]
+        patterns = {pattern for path in sources for pattern in cells_printed(path)}
+        for cell in head.strip("| ").split(" | "):
+            assert any(re.fullmatch(pattern, cell.strip()) for pattern in patterns), f"{one.words}: {cell}"
+        assert {row.count("|") for row in (line, *rows)} == {head.count("|")}
+        # what a study prints beside its table is none of it, and writing it again changes nothing
+        wanted = [other.table for other in found if other.words == one.words]
+        printed = "case\n" + rows[0] + "\n\n" + "\n\n".join(wanted) + "\n\nseconds\n"
+        assert tables_printed(printed) == wanted
+        assert written(page, one.words, wanted) == page
+        changed = written(page, one.words, [table + "\n" + rows[0] for table in wanted])
+        assert changed.count(rows[0]) == page.count(rows[0]) + len(wanted)
 
 
 @pytest.mark.long

@@ -9,6 +9,7 @@ import sys
 import pytest
 
 import jointfrf as jf
+from browser import started_browser
 from documents import DOCUMENTS, ROOT
 
 EXAMPLES = sorted((ROOT / "docs" / "examples").glob("*.py"))
@@ -66,3 +67,13 @@ def test_the_site_is_built_without_a_warning(tmp_path):
     assert names <= pages
     text = (tmp_path / "site" / "docs" / "index.html").read_text(encoding="utf-8")
     assert not re.search(r"(src|href)=\"https?://", text)  # it is read without a network
+    # nor a server, and on a phone
+    some = {"search.html", "docs/index.html", "docs/accuracy.html", "docs/generated/api/jointfrf.identify.html"}
+    some.add("docs/generated/examples/amplitude.html")
+    with started_browser() as browser:
+        page = browser.new_context(viewport={"width": 390, "height": 800}).new_page()
+        for path in sorted(some):
+            page.goto((tmp_path / "site" / path).as_uri())
+            assert page.evaluate("document.documentElement.scrollWidth") <= 390, path
+        page.goto((tmp_path / "site" / "search.html").as_uri() + "?q=loss+factor")
+        page.wait_for_function("document.querySelectorAll('#search-results li').length > 3")

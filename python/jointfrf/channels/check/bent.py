@@ -233,7 +233,7 @@ def _poles(x: FloatArray, h: ComplexArray, poles: ComplexArray) -> tuple[Complex
         inside = q.conj().T @ h
         residues = np.asarray(np.linalg.solve(r, inside)[:n], np.complex128)
         slopes = residues[:, None, :] / (x[None, :, None] - poles[:, None, None]) ** 2
-        own_slopes = (slopes - np.einsum("il,klp->kip", q @ q.conj().T, slopes)).reshape(n, -1)
+        own_slopes = (slopes - q @ (q.conj().T @ slopes)).reshape(n, -1)
         step = np.linalg.lstsq(own_slopes.T, (h - q @ inside).ravel(), rcond=1e-10)[0]
         step *= min(1.0, 0.5 * float(np.min(poles.imag / np.maximum(abs(step), TINY))))
         poles = poles + step
