@@ -17,6 +17,9 @@ __all__ = ["FunctionIntervals", "Intervals", "ProfileIntervals", "ProfiledCoordi
 #: Squares on the way of the linear prediction that differ less than this from those of a parabola need no profile, and
 #: how near to a limit squares must come, relative to it; the latter where squares cost little.
 _PARABOLA, _NEAR, _PRECISE = 0.1, 0.03, 2e-4
+#: Where squares stay below this share of a limit without a minimisation, the next reach, by the parabola, is at least
+#: twice as far.
+_FAR_BELOW = 0.25
 #: Steps in search of a limit, and where squares cost little.
 _STEPS, _MANY_STEPS = 12, 30
 #: Linearisations at a value of the parameter that is held, and what a step promises at the last one.
@@ -109,11 +112,15 @@ class ProfileIntervals:
             at_bound = sign * (self.x[i] + sign * reach - bound) >= 0
             if at_bound:
                 reach = sign * (bound - self.x[i])
-            if step == 0:
-                excess = self._excess(self.squares.cost(self._there(sign * reach * along)))
-                if abs(excess / quadratic - 1) < self.parabola:
-                    return self._value(i, sign * reach * np.sqrt(limit / excess))
-            excess = self._excess(self.least(self._there(sign * reach * along), i))
+            there = self._there(sign * reach * along)
+            excess = self._excess(self.squares.cost(there))
+            if step == 0 and abs(excess / quadratic - 1) < self.parabola:
+                return self._value(i, sign * reach * np.sqrt(limit / excess))
+            if excess > _FAR_BELOW * limit:
+                # The profile is no higher than squares anywhere on the way, nor than those with all others as they are.
+                excess = self._excess(self.squares.cost(self._there(np.eye(1, self.x.size, i)[0] * sign * reach)))
+            if excess > _FAR_BELOW * limit:
+                excess = self._excess(self.least(there, i))
             # Beyond a parameter that cannot be negative squares rise like a wall.
             if abs(excess / limit - 1) < self.near or high - low < _WALL * self.near * reach:
                 break

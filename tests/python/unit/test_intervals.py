@@ -13,6 +13,8 @@ from jointfrf.identification.manifold.uncertainty import (
     profile_interval,
     spread_of,
 )
+from jointfrf.identification.minimise import Linearised
+from jointfrf.identification.profile import ProfileIntervals
 from jointfrf.identification.scatter import BLOCKS
 
 FREQ = np.linspace(20.0, 500.0, 100)
@@ -223,3 +225,46 @@ def test_parts_of_the_band_that_disagree_widen_the_variance_of_what_they_disagre
     assert spread.chance[1] > 1e-3
     assert spread.factor[0] >= spread.blocks[0]
     assert spread.blocks[1] < 3
+
+
+class _Flattening:
+    """Squares a^2 / sqrt(1 + 16 a^2) + (b - a)^2 + 0 c: rise like |a| far from a = 0, and c is in none of them."""
+
+    unit, bounds, longest = 1.0, (np.full(3, -np.inf), np.full(3, np.inf)), np.full(3, np.inf)
+
+    def __init__(self):
+        self.linearisations = 0
+
+    def residual(self, x):
+        return np.array([x[0] / (1 + 16 * x[0] ** 2) ** 0.25, x[1] - x[0]])
+
+    def cost(self, x):
+        return float((self.residual(x) ** 2).sum())
+
+    def linearised(self, x):
+        self.linearisations += 1
+        of_a = (1 + 8 * x[0] ** 2) / (1 + 16 * x[0] ** 2) ** 1.25
+        slope = np.array([[of_a, 0, 0], [-1, 1, 0]])
+        return Linearised(self.cost(x), slope.T @ slope, -slope.T @ self.residual(x))
+
+    def value(self, i, x):
+        return float(x[i])
+
+    def end(self, i, sign):
+        return sign * np.inf
+
+    def longest_reach(self, i):
+        return np.inf
+
+
+@pytest.mark.parametrize("beside", [0.0, 1e4])
+def test_a_limit_far_off_is_found_and_one_that_is_not_there_needs_no_minimisation(beside):
+    """`beside` links c to a, as rounding does where nothing holds c: then the way of the covariance is steep."""
+    squares = _Flattening()
+    covariance = np.array([[1.0, 1.0, beside], [1.0, 2.0, beside], [beside, beside, 1e6]])
+    profile = ProfileIntervals(squares, squares, np.zeros(3), 0.0, covariance, 1.0)
+    assert profile.of(2, 0.95) == (-np.inf, np.inf)
+    assert squares.linearisations == 0
+    for limit in profile.of(0, 0.95):
+        # b follows a at no cost.
+        assert limit**2 / np.sqrt(1 + 16 * limit**2) == pytest.approx(REACH**2, rel=0.03)
