@@ -726,7 +726,10 @@ def poor_laws(fit: Fit, is_log: dict[str, bool], limits: Callable[[str], tuple[f
         if one.origin != "joint" or not is_log[one.name] or one.unit == "s" or errors[one.name] < _WELL * value:
             continue
         low, high = limits(one.name)
-        if not high < float("inf") and low > 0:
+        if not (high < float("inf") or low > 0):
+            text = f"{one}: the FRFs say nothing of it, from free to rigid (95 %)"
+            found.append(warn("open", text, (one.name,)))
+        elif not high < float("inf"):
             text = f"{one}: cannot be distinguished from rigid; at least {low:.3g} {one.unit} (95 %)"
             found.append(warn("open", text, (one.name,)))
         elif not low > 0:

@@ -213,9 +213,11 @@ class Fit(WithFindings):
 
     @property
     def correlation(self) -> FloatArray:
-        """Correlation of the errors of all parameters, shape (p, p)."""
+        """Correlation of the errors of all parameters, shape (p, p); none where nothing is known of a parameter."""
         size = np.sqrt(np.maximum(np.diagonal(self.covariance), np.finfo(float).tiny))
-        return np.asarray(self.covariance / np.outer(size, size))
+        known = np.isfinite(np.outer(size, size))
+        found = np.eye(size.size)
+        return np.asarray(np.divide(self.covariance, np.outer(size, size), out=found, where=known))
 
     def _matrix(self, kind: ParameterKind) -> FloatArray:
         matrix = _matrix(self.dofs, self.parameters, self.estimate, kind)

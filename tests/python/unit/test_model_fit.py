@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import jointfrf as jf
 from jointfrf.cases.known_joint.decoupling import decoupling_bound, fit_decoupling
@@ -174,6 +175,36 @@ def test_derivatives_are_those_of_complex_steps():
             re, im = frfs_by_real_blocks(named | {name: named[name] + 1j * step}, omega)
             exact = (re.imag + 1j * im.imag) / step
             assert np.allclose(slopes[i, line], exact, rtol=1e-3, atol=2e-4 * abs(exact).max()), name
+
+
+def test_what_no_frf_shows_is_as_it_was_believed_and_open_on_both_sides(tmp_path):
+    """A mass on a spring beside each beam, in x: no channel sees it, and y and theta are found as ever."""
+
+    def beside(model, k):
+        both = [
+            sparse.block_diag([matrix, [[value]]]).tocsr() for matrix, value in ((model.stiffness, k), (model.mass, 1))
+        ]
+        return replace(model, stiffness=both[0], mass=both[1], dofs=(*model.dofs, "9:x"))
+
+    parts = beside(arm(), 1e6), beside(free_beam(), 1e5)
+    guess = jf.Joint([1e5, 1e3, 2e5], [5, 0.5, 7.0], ["y", "theta", "x"])
+    sides = [
+        jf.Substructure(one, [f"{n}:y", f"{n}:theta", "9:x"], exact=True) for one, n in zip(parts, (7, 1), strict=True)
+    ]
+    measured = jf.pollute(assembly().receptance(FREQ, CHANNELS, CHANNELS), 0.01, seed=3)
+    fit = fit_of(FREQ, measured, jf.Assembly(*sides, guess), CHANNELS, CHANNELS, noise=0.01)
+    assert any(str(one.text).startswith("k_x: the FRFs say nothing of it") for one in fit.findings)
+    assert fit.is_converged
+    assert fit.intervals.of("k_x", 0.95) == (0.0, np.inf)
+    assert fit.intervals.of("c_x", 0.95) == (-np.inf, np.inf)
+    assert fit.value["c_x"] == pytest.approx(7.0, rel=1e-3)
+    assert fit.std_error["c_x"] == np.inf
+    jf.save(fit, tmp_path / "fit.json")
+    assert jf.load(tmp_path / "fit.json").std_error == fit.std_error
+    plain = jf.Joint([1e5, 1e3], [5, 0.5], ["y", "theta"])
+    other = fit_of(FREQ, measured, assembly(plain), CHANNELS, CHANNELS, noise=0.01)
+    for name in PLAIN_NAMES:
+        np.testing.assert_allclose(fit.intervals.of(name, 0.95), other.intervals.of(name, 0.95), rtol=1e-4)
 
 
 def test_frfs_of_the_assembly_are_those_of_its_matrices():

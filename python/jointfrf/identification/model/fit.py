@@ -301,8 +301,12 @@ def _about(problem: ModelProblem, noise: NoiseModel, predicted: ComplexArray) ->
 
 
 def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel:
-    """Return covariance, intervals and tests at a minimum."""
+    """Return covariance, intervals and tests at a minimum, where what FRFs say nothing of is as it was believed."""
     likelihood = problem.likelihood
+    believed = problem.vector.to_coordinates(problem.vector.values)
+    # A logarithm far away may well be seen.
+    blind = likelihood.blind(minimum.information) & ~likelihood.vector.is_log
+    minimum = minimum._replace(x=np.where(blind, believed, minimum.x))
     residual, predicted = _residual(problem, likelihood, minimum)
     test = with_error = _test(problem, likelihood, minimum, residual, predicted)
     # Of a residual that errors of channels explain, none is one of the models.
@@ -331,7 +335,8 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
         covariance, factor = covariance * np.sqrt(np.outer(wider, wider)), factor * wider
     covariance *= np.outer(slope, slope)
     whole = inverse_information(minimum.information, open_ends=True)
-
+    unknown = np.flatnonzero(blind)
+    whole[unknown, unknown] = covariance[unknown, unknown] = np.inf
     of_spread = spread_factors(vector, minimum)[:n] > _OF_SPREAD if vector.means else np.zeros(n, bool)
     profiles = _Profiles(likelihood, vector, minimum, whole, factor, of_spread)
     intervals = Intervals([one.name for one in vector.fitted[:n]], profiles.of, profiles.of_function)

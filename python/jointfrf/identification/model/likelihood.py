@@ -15,6 +15,10 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["Likelihood", "LogLikelihood", "WeightedResiduals"]
 
+#: A value of which the FRFs say less than that it is this many times the one it began with, and this many units, is
+#: not sought: what they seem to say is rounding.
+_BLIND = 1e9
+
 
 @dataclass(frozen=True)
 class WeightedResiduals(ABC):
@@ -87,7 +91,18 @@ class WeightedResiduals(ABC):
         information = (real @ real.T) * np.outer(by_x, by_x) + of_pulls.T @ of_pulls
         gradient = (real @ residual.view(np.float64)) * by_x - of_pulls.T @ pulls
         cost = _squares(residual) + float((pulls**2).sum())
+        blind = self.blind(information)
+        information[blind] = information[:, blind] = gradient[blind] = 0
+        information[blind, blind] = self._least_information[blind]
         return Linearised(cost if np.isfinite(cost) else np.inf, information, gradient)
+
+    def blind(self, information: FloatArray) -> NDArray[np.bool_]:
+        """Return the coordinates of which the FRFs say nothing where they are, and which are not sought from there."""
+        return np.asarray(np.diagonal(information) <= self._least_information)
+
+    @property
+    def _least_information(self) -> FloatArray:
+        return np.asarray(self.unit / (_BLIND * np.maximum(1.0, 1 / self.vector.scale)) ** 2)
 
 
 @dataclass(frozen=True)
