@@ -2,6 +2,7 @@
 
     tests/accuracy/run                          all trials, 300 draws each
     tests/accuracy/run bound stiff --draws 50   some of them
+    tests/accuracy/run bound --known            with the variance of the noise given: what its estimate costs
 
 Draw number i of a trial has the seed i, so that a longer run continues a shorter one.
 """
@@ -57,19 +58,32 @@ class Row:
     seconds: float
 
 
-def one_draw(trial: Trial, seed: int) -> Draw:
-    """Fit one draw, its noise unknown."""
+def one_draw(trial: Trial, seed: int, known: bool = False) -> Draw:
+    """Fit one draw, its noise unknown, or known by its variance on each line."""
     freq, gamma, joint = trial.draw(seed)
+    variance = None
+    if known:
+        exact = trial.exact.gamma[np.isin(trial.exact.freq_hz, freq)]
+        variance = trial.level**2 * sizes_of(trial, exact, freq) ** 2
+        # FRFs that are zero have no relative noise, and a fit no variance of zero
+        variance = np.maximum(variance, variance[variance > 0].min())
     start = time.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            fit = jf.identify(freq, gamma, joint.dofs, damping=trial.damping, cross=trial.cross, same=trial.same)
+            fit = jf.identify(
+                freq, gamma, joint.dofs, damping=trial.damping, cross=trial.cross, same=trial.same, noise=variance
+            )
         except ValueError:
             # No joint was found, and that is said.
             return Draw({}, {}, time.perf_counter() - start)
         intervals = fit.confidence_interval(0.95)
     return Draw(fit.value, intervals, time.perf_counter() - start)
+
+
+def sizes_of(trial: Trial, gamma: np.ndarray, freq: np.ndarray) -> np.ndarray:
+    """Standard deviation of the noise of each FRF at level 1; of noise that is not independent, its size."""
+    return abs(SIZES[trial.noise](gamma, freq) if trial.noise in SIZES else gamma)
 
 
 def truth_of(trial: Trial) -> tuple[dict[str, float], dict[str, float]]:
@@ -85,7 +99,7 @@ def truth_of(trial: Trial) -> tuple[dict[str, float], dict[str, float]]:
     matrices = {0: joint.stiffness, 1: joint.structural_damping, 2: joint.damping}
     values = [matrices[kind][a, b] for kind, (a, b) in zip(terms.kinds, terms.pairs, strict=True)]
     names = [one.name for one in terms.parameters]
-    std = abs(SIZES[trial.noise](gamma, freq) if trial.noise in SIZES else gamma)
+    std = sizes_of(trial, gamma, freq)
     bound = np.full(len(names), np.nan)
     for group in _groups(gamma):
         own_terms, which = terms.of_dofs(group)
@@ -172,15 +186,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("parts", nargs="*", choices=[*TRIALS, []], help=f"out of {', '.join(TRIALS)}; all by default")
     parser.add_argument("--draws", type=int, default=300)
+    parser.add_argument("--known", action="store_true", help="the variance of the noise is given")
     parser.add_argument("--workers", type=int, default=None, help="processes; one a core by default")
     args = parser.parse_args()
     rows = []
+    fit = partial(one_draw, known=args.known)
     with ProcessPoolExecutor(args.workers) as pool:
         for part in args.parts or TRIALS:
             for trial in TRIALS[part]:
-                rows.append(row_of(trial, list(pool.map(partial(one_draw, trial), range(args.draws)))))
+                rows.append(row_of(trial, list(pool.map(partial(fit, trial), range(args.draws)))))
                 print(table(rows[-1:]).splitlines()[-1], flush=True)
-    print(f"\n{table(rows)}")
+    print(f"\n{table(rows)}\n")
+    for row in rows:
+        ratios = np.array(list(row.rmse_to_bound.values()))
+        print(f"{row.name}: RMSE / bound, all {ratios.size} parameters together: {np.sqrt((ratios**2).mean()):.2f}")
 
 
 if __name__ == "__main__":

@@ -90,7 +90,7 @@ def rows(members: list[dict], how: str) -> dict[str, np.ndarray]:
 
 
 def percent(share: float) -> str:
-    return f"{100 * share:.3g} %"
+    return "-" if np.isnan(share) else f"{100 * share:.3g} %"
 
 
 def tables(members: list[dict]) -> None:
@@ -117,9 +117,17 @@ def tables(members: list[dict]) -> None:
             print(f"| {low:g}-{high:g} | {some.sum()} | {how} | {percent(np.median(width))} | "
                   f"{percent((own['low'][some] <= 0).mean())} | {percent(np.median(error))} | "
                   f"{percent(np.quantile(error, 0.9))} |")  # fmt: skip
+    print(
+        "\n| models of the sides | fits | above 5 s | "
+        + " | ".join(("all", *kinds))
+        + " |\n|"
+        + "---|" * (4 + len(kinds))
+    )
     for how in ("none", *WRONG):
-        seconds = [one[how]["seconds"] for one in members if "seconds" in one.get(how, {})]
-        print(f"{how}: processor time of a fit {np.median(seconds):.2f} s, at most {max(seconds):.2f} s")
+        timed = [(one[how]["seconds"], one["kinds"]) for one in members if "seconds" in one.get(how, {})]
+        own = [[time for time, of in timed if kind is None or kind in of] for kind in (None, *kinds)]
+        cells = (f"{np.median(some):.2f}, {max(some):.1f}" if some else "-" for some in own)
+        print(f"| {how} | {len(timed)} | {sum(time > 5 for time, _ in timed)} | {' | '.join(cells)} |")
 
 
 def main() -> None:
