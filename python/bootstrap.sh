@@ -325,7 +325,10 @@ make_venv() {
   state >"$stamp.test"
 }
 
-up_to_date "$1" && exit
+# An editable installation keeps no compiled modules by itself: each start of a command would compile some two hundred.
+compile_modules() { "$venv/bin/python" -m compileall -qq python/jointfrf || :; }
+
+up_to_date "$1" && compile_modules && exit
 if ! mkdir -p build 2>/dev/null || [ ! -w build ] || [ ! -w . ]; then
   say "$root cannot be written: copy or clone the project to a folder of your own"
   exit 1
@@ -346,3 +349,4 @@ if [ "$1" = test ]; then
   offer calculix 'FE programs' ccx
 fi
 make_venv "$1"
+compile_modules

@@ -95,11 +95,20 @@ def test_a_list_of_modules_names_what_a_room_has():
     listed = 0
     for front in PACKAGE.rglob("__init__.py"):
         named = set(re.findall(r"^(\w+)/? {2,}\S", ast.get_docstring(ast.parse(front.read_text("utf-8"))) or "", re.M))
-        there = {one.stem for one in front.parent.iterdir() if one.suffix == ".py" or one.is_dir()}
+        there = {one.stem for one in front.parent.iterdir() if one.suffix == ".py" or any(one.glob("*.py"))}
         there -= {"__init__", "__pycache__"}
         assert not named or named == there, front
         listed += len(named)
     assert listed > 60
+
+
+def test_compiled_modules_of_a_checkout_are_not_installed():
+    build = PACKAGE.parent / "meson.build"
+    if not build.exists():
+        pytest.skip("the package is installed, not in a checkout")
+    (listed,) = re.findall(r"foreach room : \[(.*?)\]", build.read_text("utf-8"), re.S)
+    rooms = {front.parent.relative_to(PACKAGE).as_posix() for front in PACKAGE.rglob("__init__.py")} - {"."}
+    assert set(re.findall(r"'([^']+)'", listed)) == rooms
 
 
 def test_only_the_room_kernel_imports_the_compiled_kernel():
