@@ -11,7 +11,7 @@ import numpy as np
 
 from jointfrf.channels.check.channel_ratios import unit_of_factor
 from jointfrf.channels.check.finding import FindingKind, FindingLevel, FrfFinding
-from jointfrf.channels.check.rigid_motion import ChannelGroup, Suspects, expected_motion, find_suspects
+from jointfrf.channels.check.rigid_motion import ChannelGroup, Suspects, column_size, expected_motion, find_suspects
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
 __all__ = ["RigidFault", "rigid_faults"]
@@ -145,8 +145,7 @@ def _finding(group: ChannelGroup, suspects: Suspects, freq_hz: FloatArray, names
 
 def _seen(group: ChannelGroup, i: int, motion: ComplexArray, freq_hz: FloatArray) -> _Seen:
     """Relate a channel to the motion of the others; every column with the same weight on every line."""
-    size = np.sqrt(np.median(abs(group.h) ** 2, axis=1))
-    size = np.where(size > 0, size, 1.0)
+    size = column_size(group.h)
     place = np.einsum("ab,fbn->fan", group.at(group.positions[i]), motion) / size[:, None]
     return _Seen(freq_hz, group.h[:, i] / size, place, group.directions[i])
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from jointfrf.channels.virtual_point import ROUND_OFF, UNSEEN
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
-__all__ = ["ChannelGroup", "Suspects", "expected_motion", "find_suspects", "not_rigid"]
+__all__ = ["ChannelGroup", "Suspects", "column_size", "expected_motion", "find_suspects", "not_rigid"]
 
 #: A band is judged in this many parts, and by the share of them in which the other channels move most like one body:
 #: there the deformation of the sides, which grows with frequency and at antiresonances, says least.
@@ -190,9 +190,7 @@ class _Residuals:
 
 def _residuals(group: ChannelGroup) -> _Residuals:
     """Weigh channels by the motion that the others expect of them, and split the squares by parts of the band."""
-    h = group.h
-    size = np.sqrt(np.median(h.real**2 + h.imag**2, axis=1))
-    u = h / np.where(size > 0, size, 1.0)[:, None, :]
+    u = group.h / column_size(group.h)[:, None, :]
     power = (u.real**2 + u.imag**2).mean(axis=(0, 2))
     # A channel that is far too large must not say what is expected of the others.
     root = np.maximum(power, np.median(power)) ** -0.5
@@ -203,8 +201,8 @@ def _residuals(group: ChannelGroup) -> _Residuals:
     own = (u.real**2 + u.imag**2).mean(axis=(0, 2))
     root = np.maximum(np.maximum(power, _LEAST_POWER * np.median(power)), own / _MOST_POWER) ** -0.5
     x = root[:, None] * u
-    n = max(min(_PARTS, h.shape[0] // _LEAST_LINES), 1)
-    lines = np.array_split(np.arange(h.shape[0]), n)
+    n = max(min(_PARTS, group.h.shape[0] // _LEAST_LINES), 1)
+    lines = np.array_split(np.arange(group.h.shape[0]), n)
     products = np.stack([np.einsum("fic,fjc->ij", x[part], x[part].conj(), optimize=True) for part in lines])
     return _Residuals(lines, root, _projection(group.motion, root), products)
 
@@ -259,6 +257,19 @@ def _judged(
     ratio = float(np.median((residuals.whole - squares)[best] / taken / left[best]))
     relative = float(np.sqrt(np.median(squares[best] / size[best])))
     return Suspects(kind, tuple(own), gain, ratio, relative, np.concatenate([residuals.lines[b] for b in sorted(best)]))
+
+
+def column_size(h: ComplexArray) -> FloatArray:
+    """Return the median size of the channels that move, by lines and columns, shape (n_freq, n); 1 where none does.
+
+    In a plane of symmetry most channels do not but for rounding.
+    """
+    power = np.sort(h.real**2 + h.imag**2, axis=1)
+    most = power.shape[1]
+    still = (power <= ROUND_OFF**2 * power[:, -1:]).sum(axis=1, keepdims=True)
+    middle = [np.minimum((still + most - back) // 2, most - 1) for back in (1, 0)]
+    found = np.sqrt(sum(np.take_along_axis(power, at, axis=1) for at in middle) / 2)[:, 0]
+    return np.asarray(np.where(found > 0, found, 1.0))
 
 
 def expected_motion(group: ChannelGroup, others: NDArray[np.intp]) -> ComplexArray:
