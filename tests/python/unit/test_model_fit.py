@@ -204,7 +204,8 @@ def test_what_no_frf_shows_is_as_it_was_believed_and_open_on_both_sides(tmp_path
     plain = jf.Joint([1e5, 1e3], [5, 0.5], ["y", "theta"])
     other = fit_of(FREQ, measured, assembly(plain), CHANNELS, CHANNELS, noise=0.01)
     for name in PLAIN_NAMES:
-        np.testing.assert_allclose(fit.intervals.of(name, 0.95), other.intervals.of(name, 0.95), rtol=1e-4)
+        low, high = other.intervals.of(name, 0.95)  # as near as limits are sought
+        np.testing.assert_allclose(fit.intervals.of(name, 0.95), (low, high), rtol=0, atol=0.05 * (high - low))
 
 
 def test_frfs_of_the_assembly_are_those_of_its_matrices():

@@ -54,6 +54,8 @@ _TURNS = 2
 _OF_SPREAD = 2.0
 #: Reductions of the models are extended at most so many times.
 _REFINED = 3
+#: -2 log likelihood of two points that differ by less is the same.
+_SAME = 1e-3
 
 
 @dataclass(frozen=True)
@@ -303,10 +305,6 @@ def _about(problem: ModelProblem, noise: NoiseModel, predicted: ComplexArray) ->
 def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel:
     """Return covariance, intervals and tests at a minimum, where what FRFs say nothing of is as it was believed."""
     likelihood = problem.likelihood
-    believed = problem.vector.to_coordinates(problem.vector.values)
-    # A logarithm far away may well be seen.
-    blind = likelihood.blind(minimum.information) & ~likelihood.vector.is_log
-    minimum = minimum._replace(x=np.where(blind, believed, minimum.x))
     residual, predicted = _residual(problem, likelihood, minimum)
     test = with_error = _test(problem, likelihood, minimum, residual, predicted)
     # Of a residual that errors of channels explain, none is one of the models.
@@ -316,7 +314,12 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
         likelihood, minimum = found[:2]
         residual, predicted = _residual(problem, likelihood, minimum)
         with_error = _test(problem, likelihood, minimum, residual, predicted)
-    vector, n = likelihood.vector, likelihood.vector.n_shown
+    vector, n, blind = likelihood.vector, likelihood.vector.n_shown, likelihood.blind(minimum.information)
+    if blind.any():
+        # What they were believed to be is as good as where rounding has led.
+        believed = np.where(blind, vector.to_coordinates(vector.values), minimum.x)
+        blind &= bool(likelihood.cost(believed) < minimum.cost + _SAME)
+        minimum = minimum._replace(x=np.where(blind, believed, minimum.x))
     values = vector.to_values(minimum.x)
     gradient = ModelGradient.of(likelihood, minimum, problem.noise.inflation)
     own, slope, errors = gradient.covariance, vector.slope(minimum.x)[:n], problem.noise.calibration

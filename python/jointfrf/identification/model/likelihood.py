@@ -15,8 +15,8 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["Likelihood", "LogLikelihood", "WeightedResiduals"]
 
-#: A value of which the FRFs say less than that it is this many times the one it began with, and this many units, is
-#: not sought: what they seem to say is rounding.
+#: Of a value that is known to this many times the one it began with, and this many units, at best, FRFs say nothing:
+#: the rest is rounding.
 _BLIND = 1e9
 
 
@@ -91,18 +91,12 @@ class WeightedResiduals(ABC):
         information = (real @ real.T) * np.outer(by_x, by_x) + of_pulls.T @ of_pulls
         gradient = (real @ residual.view(np.float64)) * by_x - of_pulls.T @ pulls
         cost = _squares(residual) + float((pulls**2).sum())
-        blind = self.blind(information)
-        information[blind] = information[:, blind] = gradient[blind] = 0
-        information[blind, blind] = self._least_information[blind]
         return Linearised(cost if np.isfinite(cost) else np.inf, information, gradient)
 
     def blind(self, information: FloatArray) -> NDArray[np.bool_]:
-        """Return the coordinates of which the FRFs say nothing where they are, and which are not sought from there."""
-        return np.asarray(np.diagonal(information) <= self._least_information)
-
-    @property
-    def _least_information(self) -> FloatArray:
-        return np.asarray(self.unit / (_BLIND * np.maximum(1.0, 1 / self.vector.scale)) ** 2)
+        """Return the values of which the FRFs say nothing; of logarithms, none: far away they may well be seen."""
+        least = self.unit / (_BLIND * np.maximum(1.0, 1 / self.vector.scale)) ** 2
+        return np.asarray(~self.vector.is_log & (np.diagonal(information) <= least))
 
 
 @dataclass(frozen=True)
