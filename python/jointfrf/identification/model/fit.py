@@ -54,6 +54,9 @@ _TURNS = 2
 _OF_SPREAD = 2.0
 #: Reductions of the models are extended at most so many times.
 _REFINED = 3
+#: Of a value that is known to this many times the one it began with, and this many units, at best, FRFs say nothing:
+#: the rest is rounding.
+_BLIND = 1e9
 #: -2 log likelihood of two points that differ by less is the same.
 _SAME = 1e-3
 
@@ -314,7 +317,10 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
         likelihood, minimum = found[:2]
         residual, predicted = _residual(problem, likelihood, minimum)
         with_error = _test(problem, likelihood, minimum, residual, predicted)
-    vector, n, blind = likelihood.vector, likelihood.vector.n_shown, likelihood.blind(minimum.information)
+    vector, n = likelihood.vector, likelihood.vector.n_shown
+    # Of logarithms none: far away they may well be seen.
+    least = (_BLIND * np.maximum(1.0, 1 / vector.scale)) ** -2
+    blind = ~vector.is_log & (np.diagonal(minimum.information) <= least)
     if blind.any():
         # What they were believed to be is as good as where rounding has led.
         believed = np.where(blind, vector.to_coordinates(vector.values), minimum.x)

@@ -15,10 +15,6 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["Likelihood", "LogLikelihood", "WeightedResiduals"]
 
-#: Of a value that is known to this many times the one it began with, and this many units, at best, FRFs say nothing:
-#: the rest is rounding.
-_BLIND = 1e9
-
 
 @dataclass(frozen=True)
 class WeightedResiduals(ABC):
@@ -92,11 +88,6 @@ class WeightedResiduals(ABC):
         gradient = (real @ residual.view(np.float64)) * by_x - of_pulls.T @ pulls
         cost = _squares(residual) + float((pulls**2).sum())
         return Linearised(cost if np.isfinite(cost) else np.inf, information, gradient)
-
-    def blind(self, information: FloatArray) -> NDArray[np.bool_]:
-        """Return the values of which the FRFs say nothing; of logarithms, none: far away they may well be seen."""
-        least = self.unit / (_BLIND * np.maximum(1.0, 1 / self.vector.scale)) ** 2
-        return np.asarray(~self.vector.is_log & (np.diagonal(information) <= least))
 
 
 @dataclass(frozen=True)
