@@ -16,7 +16,7 @@ from jointfrf.channels.check.check import warn_of_frfs
 from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.channels.point_lines import difference_error
 from jointfrf.cli.check import check_joint
-from jointfrf.cli.export import add_card_arguments, card_request, page_nodes, parse_export, written_cards
+from jointfrf.cli.export import CardRequest, add_card_arguments, card_request, page_nodes, parse_export, written_cards
 from jointfrf.cli.identify_model import add_model_arguments, run_model
 from jointfrf.cli.joint_laws import add_law_arguments, joint_of_laws
 from jointfrf.cli.measured_file import (
@@ -138,6 +138,42 @@ def add_arguments(parser: CommandParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
+    _check_results(args)
+    if args.model is not None:
+        _refuse(args, ("points", "same"), "is of FRFs at the joint points themselves: it does not go with --model")
+        return run_model(args)
+    _refuse(args, ("each", "find_wrong_channels"), "is for tests with --model: name the file of the assembly")
+    out = Output(args)
+    _check_points(args)
+    measured = read_measured(args)
+    frfs = measured.receptance()
+    joint = measured_joint(args, frfs, args.bending_stiffness)
+    laws = joint_of_laws(args, joint.dofs)
+    sides = _sides(args, frfs, joint)
+    points = np.array(joint.responses.references)
+    damping = args.damping if laws is None else "none"
+    request = card_request(args, joint.dofs, damping=damping, cross=args.cross, points=points)
+    check = check_joint(joint, measured.quantity)
+    if not args.accept_bent:
+        refuse_bent(check.findings)
+    _warn(args, joint, check)
+    out.say(*_heading(args, frfs, joint), *(line for side in sides for line in side.text))
+    fits = []
+    for method in args.method:
+        with waiting(f"fit by {method}"):
+            fits.append(_fit(args, method, frfs, joint, laws, tuple(side.model for side in sides)))
+        out.say("", fits[-1])
+        out.warn(*fits[-1].warnings)
+    text, written = _write_results(args, frfs, joint, fits, request)
+    if text and args.output is None:
+        out.say("", text.rstrip("\n"))
+    out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
+    out.give(_content(args, joint, check, fits, text, written))
+    return 0
+
+
+def _check_results(args: argparse.Namespace) -> None:
+    """Raise an error for results that cannot be written, before anything is read."""
     if args.out is not None:
         check_extras("matplotlib")
         check_out("--out", args.out)
@@ -151,36 +187,30 @@ def run(args: argparse.Namespace) -> int:
     elif args.space:
         raise UsageError("--space is of --report: name a file for the page")
     check_folder("--save", args.save)
-    if args.model is not None:
-        for name in ("points", "same"):
-            if getattr(args, name) is not None:
-                raise UsageError(f"--{name} is of FRFs at the joint points themselves: it does not go with --model")
-        return run_model(args)
-    for option in ("each", "find_wrong_channels"):
-        if getattr(args, option):
-            name = option.replace("_", "-")
-            raise UsageError(f"--{name} is for tests with --model: name the file of the assembly")
-    out = Output(args)
+
+
+def _refuse(args: argparse.Namespace, names: tuple[str, ...], why: str) -> None:
+    """Raise an error for the first of these options that is given."""
+    for name in names:
+        if getattr(args, name):
+            raise UsageError(f"--{name.replace('_', '-')} {why}")
+
+
+def _check_points(args: argparse.Namespace) -> None:
+    """Raise an error for options that do not go with the number of joint points."""
     if args.save is None:
         warn_of_ignored(args, ("--save-lines",), "it is for --save")
-    if args.points is not None:
-        _check_points(args)
-    elif args.same is not None:
-        raise UsageError("--same is of several joint points: name them by --points")
-    measured = read_measured(args)
-    frfs = measured.receptance()
-    joint = measured_joint(args, frfs, args.bending_stiffness)
-    points = np.array(joint.responses.references)
-    laws = joint_of_laws(args, joint.dofs)
-    damping = args.damping if laws is None else "none"
-    sides = _sides(args, frfs, joint)
-    request = card_request(args, joint.dofs, damping=damping, cross=args.cross, points=points)
-    check = check_joint(joint, measured.quantity)
-    if not args.accept_bent:
-        refuse_bent(check.findings)
+    if args.points is None:
+        _refuse(args, ("same",), "is of several joint points: name them by --points")
+    else:
+        _refuse(args, ("side_j", "side_k"), "corrects the FRFs of one joint point: it does not go with --points")
+
+
+def _warn(args: argparse.Namespace, joint: MeasuredJoint, check: FrfCheck) -> None:
+    """Warn of what is wrong with the FRFs, and of options that are not used."""
     warn_of_frfs(check, bent="compliance" not in args.method)
     for text in joint.warnings(check):
-        warnings.warn(text, FrfCheckWarning, stacklevel=2)
+        warnings.warn(text, FrfCheckWarning, stacklevel=3)
     if "compliance" not in args.method:
         warn_of_ignored(
             args,
@@ -189,23 +219,19 @@ def run(args: argparse.Namespace) -> int:
         )
     if joint.channels is not None or len(joint.nodes[0]) == 1:
         warn_of_ignored(args, ("--bending-stiffness",), "no rotation is found by differences along a line")
-    out.say(*_heading(args, frfs, joint), *(line for side in sides for line in side.text))
-    fits = []
-    for method in args.method:
-        with waiting(f"fit by {method}"):
-            fits.append(_fit(args, method, frfs, joint, laws, tuple(side.model for side in sides)))
-        out.say("", fits[-1])
-        out.warn(*fits[-1].warnings)
+
+
+def _write_results(
+    args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, fits: list[Fit], request: CardRequest | None
+) -> tuple[str, list[Path]]:
+    """Write what the options ask for; return the cards and the files written."""
     text, written = "", []
     if args.save is not None:
         _save(args.save, fits[0], file_names(args), joint, lines=args.save_lines)
         written.append(args.save)
     if request is not None:
-        about = [f"from {file_names(args)}", *_places(joint)]
-        text = written_cards(fits[0], request, about)
+        text = written_cards(fits[0], request, [f"from {file_names(args)}", *_places(joint)])
         written += [] if args.output is None else [args.output]
-    if text and args.output is None:
-        out.say("", text.rstrip("\n"))
     if args.report is not None:
         fit = fits[args.method.index("compliance")]
         args.report.parent.mkdir(parents=True, exist_ok=True)
@@ -213,19 +239,7 @@ def run(args: argparse.Namespace) -> int:
                                     nodes=page_nodes(args), space=args.space))  # fmt: skip
     if args.out is not None:
         written += _write_figures(args, frfs, joint, fits)
-    out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
-    out.give(_content(args, joint, check, fits, text, written))
-    return 0
-
-
-def _check_points(args: argparse.Namespace) -> None:
-    """Raise an error for options that are of one joint point."""
-    for name, value, instead in (
-        ("--side-j", args.side_j, "models of the sides correct the FRFs of one joint point"),
-        ("--side-k", args.side_k, "models of the sides correct the FRFs of one joint point"),
-    ):
-        if value is not None:
-            raise UsageError(f"--points does not go with {name}: {instead}")
+    return text, written
 
 
 def _content(
