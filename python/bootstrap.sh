@@ -25,8 +25,8 @@ log=$root/build/set-up.log
 lock=$root/build/set-up.lock
 stamp=$venv/set-up
 readers=build/installed-readers.json
-# Folders of packages that cases and commands do not import.
-not_compiled='/(tests|fontTools|mesonbuild|pip|setuptools|pkg_resources)/'
+# Folders of packages that cases and commands do not import, or little of.
+not_compiled='/(tests|fontTools|mesonbuild|pip|setuptools|pkg_resources|plotly|statsmodels|sphinx|babel)/'
 
 say() { echo "jointfrf: $*" >&2; }
 
