@@ -8,7 +8,18 @@ program test_noise
   use jointfrf_lanes, only: lane_kernels, lanes
   use jointfrf_noise, only: make_noise, noise_model, pollute
   implicit none
-  character, parameter :: kinds(5) = ['C', 'P', 'N', 'U', 'S']
+
+  !> A kind of noise: its letter, E|e|^2 and E|e|^4 at level 1, whether all phases are equally likely, or e is real.
+  type :: noise_kind
+    character :: letter
+    real(dp) :: power, fourth
+    logical :: is_circular
+  end type noise_kind
+
+  type(noise_kind), parameter :: kinds(*) = [ &
+    noise_kind('C', 1.0_dp, 2.0_dp, .true.), noise_kind('P', 2.0_dp, 8.0_dp, .true.), &
+    noise_kind('N', 1.0_dp, 3.0_dp, .false.), noise_kind('U', 1.0_dp/3.0_dp, 0.2_dp, .false.), &
+    noise_kind('S', 1.0_dp, 1.8_dp, .false.)]
   integer(ip), parameter :: some_seed(2) = [-5_ip, 77_ip]
   integer(ip) :: info, engine
 
@@ -141,8 +152,8 @@ contains
 
     h = random_lines(3, 3, lines)
     do k = 1, size(kinds)
-      noise = make_noise(kinds(k), 'L', .false., 1, 0.1_dp, some_seed)
-      name = ' '//kinds(k)//' '
+      noise = make_noise(kinds(k)%letter, 'L', .false., 1, 0.1_dp, some_seed)
+      name = ' '//kinds(k)%letter//' '
       call set_engine(engine_plain, info)
       call set_threads(1)
       call pollute(.false., noise, 2_ip, int(count, ip), h, one, info)
@@ -167,30 +178,30 @@ contains
     call set_engine(engine_automatic, info)
   end subroutine same_bits
 
-  !> E|e|^2 = 1 or 2, no mean, a circular distribution where it should be one, the fourth moment of the kind.
+  !> No mean, the second and fourth moment of the kind, and its phases.
   subroutine moments()
     integer, parameter :: n = 100000
-    real(dp), parameter :: power(5) = [1.0_dp, 2.0_dp, 1.0_dp, 1.0_dp/3.0_dp, 1.0_dp]
-    real(dp), parameter :: fourth(5) = [2.0_dp, 8.0_dp, 3.0_dp, 0.2_dp, 1.8_dp]
     complex(dp) :: h(1, 1, n), e(1, 1, n)
+    type(noise_kind) :: kind
     integer :: k
     real(dp) :: tolerance
 
     h = 1.0_dp
     tolerance = 6/sqrt(real(n, dp))
     do k = 1, size(kinds)
-      call pollute(.false., make_noise(kinds(k), 'E', .false., 1, 1.0_dp, some_seed), 0_ip, 1_ip, h, e, info)
+      kind = kinds(k)
+      call pollute(.false., make_noise(kind%letter, 'E', .false., 1, 1.0_dp, some_seed), 0_ip, 1_ip, h, e, info)
       e = e - h
-      call check(abs(sum(e))/n < tolerance*sqrt(power(k)), 'no mean '//kinds(k))
-      call check(abs(sum(abs(e)**2)/n - power(k)) < 2*tolerance*power(k), 'power '//kinds(k))
-      call check(abs(sum(abs(e)**4)/n - fourth(k)) < 5*tolerance*fourth(k), 'fourth moment '//kinds(k))
-      if (k <= 2) then
-        call check(abs(sum(e**2))/n < 2*tolerance*power(k), 'circular '//kinds(k))
+      call check(abs(sum(e))/n < tolerance*sqrt(kind%power), 'no mean '//kind%letter)
+      call check(abs(sum(abs(e)**2)/n - kind%power) < 2*tolerance*kind%power, 'power '//kind%letter)
+      call check(abs(sum(abs(e)**4)/n - kind%fourth) < 5*tolerance*kind%fourth, 'fourth moment '//kind%letter)
+      if (kind%is_circular) then
+        call check(abs(sum(e**2))/n < 2*tolerance*kind%power, 'circular '//kind%letter)
       else
-        call check(all(abs(aimag(e)) <= 0.0_dp), 'real '//kinds(k))
+        call check(all(abs(aimag(e)) <= 0.0_dp), 'real '//kind%letter)
       end if
-      call check(abs(sum(e(1, 1, 2:)*conjg(e(1, 1, :n - 1))))/n < tolerance*power(k), &
-                 'lines are independent '//kinds(k))
+      call check(abs(sum(e(1, 1, 2:)*conjg(e(1, 1, :n - 1))))/n < tolerance*kind%power, &
+                 'lines are independent '//kind%letter)
     end do
   end subroutine moments
 
