@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from scipy import stats
+from trials import Trial
 
 import jointfrf as jf
 from cramer_rao import cramer_rao
@@ -170,3 +171,18 @@ def test_equal_points_that_no_frf_connects_are_refused():
         gamma[:, i::2, i::2] = one
     with pytest.raises(ValueError, match=r"FRFs between equal points are zero, so that a.k_y, .* separate problems"):
         jf.identify(FREQ, jf.pollute(gamma, 0.01, seed=1), ["a.y", "b.y"], same=["a", "b"], damping="hysteretic")
+
+
+def test_where_single_lines_lead_nowhere_the_joint_without_cross_terms_is_near_enough():
+    # Noise hides the motion across a stiff joint on every line: starts from C of lines end at 20 times the noise.
+    trial = Trial("two bolts", "complex", 0.01, cross="points", damping="hysteretic", kind="hysteretic")
+    freq, gamma, joint = trial.draw(76)
+    own = [i for i, dof in enumerate(joint.dofs) if dof.endswith((".x", ".theta_y", ".theta_z"))]
+    at = np.r_[own, np.add(own, len(joint.dofs))]
+    dofs = [joint.dofs[i] for i in own]
+    fit = jf.identify(freq, gamma[:, at[:, None], at], dofs, damping="hysteretic", cross="points")
+    assert fit.residual_level < 1.05 * fit.noise_level
+    assert not fit.warnings
+    for point, share in (("bolt1", 1), ("bolt2", 0.7)):
+        assert fit.value[f"{point}.k_x"] == pytest.approx(share * 4e6, rel=0.01)
+        assert fit.value[f"{point}.k_x,theta_y"] == pytest.approx(share * 0.2 * np.sqrt(4e6 * 500), rel=0.2)

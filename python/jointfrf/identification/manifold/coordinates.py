@@ -121,6 +121,13 @@ class JointTerms(NamedTuple):
         parameters = tuple(self.parameters[i] for i in which)
         return JointTerms(parameters, self.omega, self.kinds[terms], place[self.pairs[terms]], shared.ravel()), which
 
+    def without_cross_terms(self) -> tuple[JointTerms, NDArray[np.intp]]:
+        """Return the terms of single DOFs, each its own parameter, and which of the parameters each was."""
+        own = np.flatnonzero(self.pairs[:, 0] == self.pairs[:, 1])
+        common = self.shared[own]
+        parameters = tuple(self.parameters[i] for i in common)
+        return JointTerms(parameters, self.omega, self.kinds[own], self.pairs[own], np.arange(own.size)), common
+
     def stiffness(self, theta: FloatArray) -> ComplexArray:
         """Return K*(w) of parameters, shape (n_freq, n, n), N/m."""
         n, (a, b) = self.n, self.pairs.T

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, get_args
@@ -14,6 +15,7 @@ from jointfrf.dofs import Parameter, ParameterKind, parameters_shared
 from jointfrf.frf.bands import spread_lines
 from jointfrf.identification.line_starts import from_lines, interface_compliance
 from jointfrf.identification.manifold.coordinates import (
+    CoupledJoint,
     CrossTerms,
     DiagonalJoint,
     JointTerms,
@@ -346,9 +348,38 @@ def _from_another_fit(search: _Search) -> GroupFit | None:
 
 
 def _from_lines(search: _Search) -> GroupFit | None:
-    """Start from single lines where no cross term of C is assumed to be zero: nothing simpler is near."""
-    is_simple = search.problem.joint.in_compliance and search.problem.joint.n > 1
-    return None if is_simple else fit_dofs(search.problem, search.starts)
+    """Start from single lines where no cross term of C is assumed to be zero; then from the joint without them."""
+    problem, joint = search.problem, search.problem.joint
+    if joint.in_compliance and joint.n > 1:
+        return None
+    found = fit_dofs(problem, search.starts)
+    if found.is_good or problem.sides_bend or not isinstance(joint, CoupledJoint) or not joint.terms.has_cross_terms:
+        return found
+    return min([found, *_from_diagonal(problem, joint)], key=lambda one: one.squares)
+
+
+def _from_diagonal(problem: GroupProblem, joint: CoupledJoint) -> list[GroupFit]:
+    """Fit from the joint without cross terms, and from where that one started.
+
+    C of single lines is far off wherever noise hides gamma_jk, and in its weakest direction the more the more entries
+    it has. A joint without cross terms is stable there, if far from the data: it is near enough to start from.
+    """
+    terms, common = joint.terms.without_cross_terms()
+    simple = DiagonalJoint(terms)
+    some = spread_lines(len(problem.data.measured))
+    starts = first_joints(problem.data.on_lines(some), simple.on_lines(some))
+    ends = starts[:1]
+    with suppress(np.linalg.LinAlgError):
+        ends.insert(0, fit_dofs(problem._replace(joint=simple), starts).x)
+    # Equal points start from their mean; cross terms, which no term here is, from 0.
+    p = joint.lower.size
+    points = np.maximum(np.bincount(common, minlength=p), 1)
+    found: list[GroupFit] = []
+    for theta in map(simple.theta, ends):
+        if np.isfinite(theta).all() and not (found and found[-1].is_good):
+            with suppress(np.linalg.LinAlgError):
+                found.append(fit_dofs(problem, [np.bincount(common, theta, p) / points]))
+    return found
 
 
 def _with_cross_terms_ignored(search: _Search) -> GroupFit | None:

@@ -127,6 +127,8 @@ def _coupled_starts(
     linear = _linear_start(value[some], own[some], line_weight[some], few)
     starts = [start for start in (linear, _mean_start(value, own, line_weight, joint)) if np.isfinite(start).all()]
     minima = sorted((few.minimise(of_few, start, least_gain=_ROUGH) for start in starts), key=lambda one: one.cost)
+    if len(minima) > 1 and minima[1].cost < minima[0].cost + _ROUGH:  # one place, found twice
+        del minima[1]
     found = [one.x for one in minima]
     if some.step > 1 and found:
         found[0] = joint.minimise(forms, found[0], least_gain=_ROUGH).x
