@@ -9,11 +9,14 @@
 !> for loops of bodies, too. H is the diagonal of the bodies' receptances, so that all products are those of one body
 !> with the rows it has a part in. The transpose of all matrices gives the transpose of Y.
 module jointfrf_bodies
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
   use jointfrf_kinds, only: dp, ip, long
+  use jointfrf_lanes, only: element_matrix, element_space, in_doubt, lane_kernels, lanes, largest_in_lanes, &
+    largest_solved, padded
   use jointfrf_line_layout, only: all_finite
   use jointfrf_lines_lapack, only: product_block, room_to_solve, solve_line
   use jointfrf_status, only: info_good, info_no_memory, line_good, line_not_finite
-  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
   public :: couple_bodies
@@ -35,9 +38,17 @@ module jointfrf_bodies
     integer, allocatable :: block_size(:)        !< rows of each connection
     real(dp), allocatable :: flexible(:)         !< S
     complex(dp), pointer, contiguous :: h(:, :) => null(), t(:, :) => null()
+    integer, allocatable :: place(:)             !< of S + T B H B^T in lanes
   contains
     procedure :: line => assemble_one
+    procedure :: line_block => assemble_block
   end type assembly
+
+  !> What a line works in.
+  type :: line_work
+    complex(dp), pointer, contiguous :: across(:, :), left(:, :), w(:, :), force(:, :), columns(:, :), rows(:, :)
+    complex(dp), pointer, contiguous :: scale(:, :), inverse(:, :)
+  end type line_work
 
 contains
 
@@ -74,8 +85,22 @@ contains
       end associate
     end do
     whole%flops = whole%flops + 32.0_dp/3.0_dp*real(whole%n_row, dp)**3
+    if (worth_a_plan(size(h, 2)) .and. whole%n_row >= 1 &
+        .and. whole%n_row <= merge(largest_in_lanes, largest_solved, whole%n_in >= whole%n_row)) call plan_lanes(whole)
     call run_sweep(whole, size(h, 2, kind=ip), line_info, rcond, info)
   end subroutine couple_bodies
+
+  subroutine plan_lanes(whole)
+    type(assembly), intent(inout) :: whole
+    type(element_space) :: room
+    type(element_matrix) :: matrix
+    integer :: before
+
+    call room%system(whole%n_row, 0, before, matrix)
+    call room%in_memory(.true., matrix, whole%place)
+    call whole%lies_in(room, whole%n_row**2)
+    whole%n_hint = padded(whole%n_row)
+  end subroutine plan_lanes
 
   subroutine plan_bodies(sizes, ends, outputs, inputs, whole, info)
     integer(ip), intent(in) :: sizes(:), ends(:, :), outputs(:), inputs(:)
@@ -179,43 +204,152 @@ contains
     info = info_good
   end subroutine plan_connections
 
+  !> Take what a line works in; of a block also the inverses of its lines, and what their rows were scaled by.
+  subroutine take_work(self, space, work)
+    class(assembly), intent(in) :: self
+    type(line_space), target, intent(inout) :: space
+    type(line_work), intent(out) :: work
+
+    associate (q => self%n_row, e => self%most_ends)
+      call space%take(q, q, work%across)
+      call space%take(q, q, work%left)
+      call space%take(q, q, work%w)
+      call space%take(self%n_in, q, work%force)
+      call space%take(max(q, self%most_out), e, work%columns)
+      call space%take(e, max(self%n_in, self%most_in), work%rows)
+      call space%take(q, lanes, work%scale)
+      if (self%n_element > 0) call space%take(q**2, lanes, work%inverse)
+      call room_to_solve(q, space)
+    end associate
+  end subroutine take_work
+
   subroutine assemble_one(self, i, space, line_info, rcond)
     class(assembly), intent(in) :: self
     integer, intent(in) :: i
     type(line_space), target, intent(inout) :: space
     integer(ip), intent(out) :: line_info
     real(dp), intent(out) :: rcond
-    complex(dp), pointer, contiguous :: across(:, :), left(:, :), w(:, :), force(:, :), columns(:, :), rows(:, :)
-    integer :: b
+    type(line_work) :: work
+    integer :: m
 
-    associate (q => self%n_row, e => self%most_ends)
-      call space%take(q, q, across)
-      call space%take(q, q, left)
-      call space%take(q, q, w)
-      call space%take(q, self%n_in, force)
-      call space%take(max(q, self%most_out), e, columns)
-      call space%take(e, max(self%n_in, self%most_in), rows)
-      call room_to_solve(q, space)
-    end associate
+    call take_work(self, space, work)
     line_info = line_not_finite
     rcond = 0.0_dp
     if (space%only_counts) return
     if (.not. (all_finite(self%h(:, i:i)) .and. all_finite(self%t(:, i:i)))) return
+    call connections(self, self%n_row, i, work%across, work%left, work%scale(:, 1))
+    if (self%n_in > 0 .and. self%n_in < self%n_row) then
+      call free_motions(self, self%n_row, self%h(:, i), work%across)
+      call by_connections(self, self%n_row, self%n_in, self%t(:, i), work%across, work%w)
+      call scale_rows(work%scale(:, 1), work%w(:, :self%n_in))
+      call solve_line(work%left, work%w(:, :self%n_in), space, line_info, rcond)
+      if (line_info /= line_good) return
+      work%force = transpose(work%w(:, :self%n_in))
+    else
+      work%across = 0
+      do m = 1, self%n_row
+        work%across(m, m) = work%scale(m, 1)
+      end do
+      call before_connections(self, self%n_row, self%t(:, i), work%across, work%w)
+      call solve_line(work%left, work%w, space, line_info, rcond)
+      if (line_info /= line_good) return
+      call find_forces(self, i, work)
+    end if
+    call find_responses(self, i, work)
+  end subroutine assemble_one
+
+  !> The inverses of S + T B H B^T side by side; all else line by line.
+  subroutine assemble_block(self, kernels, first, n_lines, space, line_info, rcond)
+    class(assembly), intent(in) :: self
+    type(lane_kernels), intent(in) :: kernels
+    integer, intent(in) :: first, n_lines
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info(n_lines)
+    real(dp), intent(out) :: rcond(n_lines)
+    real(dp), pointer, contiguous :: pairs(:, :, :)
+    real(dp) :: rcond_lanes(lanes)
+    logical :: finite(n_lines)
+    type(line_work) :: work
+    integer :: i, l, q
+
+    q = self%n_row
+    space%used = 0
+    call take_work(self, space, work)
+    do l = 1, n_lines
+      i = first + l - 1
+      finite(l) = all_finite(self%h(:, i:i)) .and. all_finite(self%t(:, i:i))
+      work%inverse(:, l) = 0
+      if (finite(l)) call connections(self, q, i, work%across, work%inverse(:, l), work%scale(:, l))
+    end do
+    call c_f_pointer(c_loc(work%inverse), pairs, [2, q**2, lanes])
+    call kernels%load(q**2, self%place, 1, n_lines, pairs, space%x)
+    call kernels%invert(q, 0, space%x, space%hint, space%list, rcond_lanes, space%ahead)
+    call kernels%store(q**2, space%list, 1, n_lines, space%x, pairs)
+    rcond = rcond_lanes(:n_lines)
+    call kernels%judge(n_lines, 0*rcond, line_info, rcond)
+    do l = 1, n_lines
+      if (line_info(l) == line_good .and. finite(l)) then
+        i = first + l - 1
+        call scale_columns(q, work%scale(:, l), work%inverse(:, l))
+        call before_connections(self, q, self%t(:, i), work%inverse(:, l), work%w)
+        finite(l) = all_finite(work%w)
+      end if
+      if (line_info(l) /= line_good .or. .not. finite(l)) then
+        line_info(l) = in_doubt
+        cycle
+      end if
+      call find_forces(self, i, work)
+      call find_responses(self, i, work)
+    end do
+  end subroutine assemble_block
+
+  !> S + T B H B^T; rows are scaled, as those of a constraint and of a stiffness are of different size.
+  !> across   workspace
+  !> scale    what the rows were multiplied by
+  subroutine connections(self, q, i, across, left, scale)
+    type(assembly), intent(in) :: self
+    integer, intent(in) :: q, i
+    complex(dp), contiguous, intent(inout) :: across(:, :)
+    complex(dp), intent(inout) :: left(q, q), scale(q)
+    integer :: b, j, k
+    real(dp) :: largest(q)
+
     across = 0
     do b = 1, size(self%bodies)
       call add_across(self%bodies(b), self%h(:, i), across)
     end do
-    call connections(self, self%n_row, self%t(:, i), across, left, w)
-    call solve_line(left, w, space, line_info, rcond)
-    if (line_info /= line_good) return
-    do b = 1, size(self%bodies)
-      call forces_of(self%bodies(b), self%n_row, self%h(:, i), w, columns, rows, force)
+    call by_connections(self, q, q, self%t(:, i), across, left)
+    largest = 0
+    do j = 1, q
+      left(j, j) = left(j, j) + self%flexible(j)
+      do k = 1, q
+        largest(k) = max(largest(k), abs(real(left(k, j), dp)) + abs(aimag(left(k, j))))
+      end do
     end do
-    do b = 1, size(self%bodies)
-      call responses_of(self%bodies(b), self%n_row, self%n_out, self%n_in, self%h(:, i), force, columns, rows, &
-                        self%result(:, :, i))
+    scale = 1/merge(largest, 1.0_dp, largest > 0)
+    call scale_rows(scale, left)
+  end subroutine connections
+
+  pure subroutine scale_rows(scale, x)
+    complex(dp), intent(in) :: scale(:)
+    complex(dp), intent(inout) :: x(:, :)
+    integer :: j
+
+    do j = 1, size(x, 2)
+      x(:, j) = x(:, j)*real(scale, dp)
     end do
-  end subroutine assemble_one
+  end subroutine scale_rows
+
+  pure subroutine scale_columns(q, scale, x)
+    integer, intent(in) :: q
+    complex(dp), intent(in) :: scale(q)
+    complex(dp), intent(inout) :: x(q, q)
+    integer :: j
+
+    do j = 1, q
+      x(:, j) = x(:, j)*real(scale(j), dp)
+    end do
+  end subroutine scale_columns
 
   !> Add the part of a body to B H B^T.
   pure subroutine add_across(own, h, across)
@@ -233,87 +367,137 @@ contains
     end do
   end subroutine add_across
 
-  !> S + T B H B^T and T; rows of either are scaled, as those of a constraint and of a stiffness are of different size.
-  subroutine connections(self, q, t, across, left, right)
+  !> T times a matrix of n columns.
+  subroutine by_connections(self, q, n, t, x, product)
     type(assembly), intent(in) :: self
-    integer, intent(in) :: q
-    complex(dp), intent(in) :: t(*), across(q, q)
-    complex(dp), intent(inout) :: left(q, q), right(q, q)
-    integer :: c, first, k, n
+    integer, intent(in) :: q, n
+    complex(dp), intent(in) :: t(*), x(q, *)
+    complex(dp), intent(inout) :: product(q, *)
+    integer :: c, first
     integer(long) :: at
-    real(dp) :: largest
 
-    right = 0
     first = 1
     at = 1
     do c = 1, size(self%block_size)
-      n = self%block_size(c)
-      call product_block(n, q, n, 1.0_dp, t(at), n, across(first, 1), q, 0.0_dp, left(first, 1), q)
-      do k = 0, n - 1
-        right(first:first + n - 1, first + k) = t(at + int(k, long)*n:at + int(k, long)*n + n - 1)
-      end do
-      first = first + n
-      at = at + int(n, long)**2
+      associate (m => self%block_size(c))
+        call product_block(m, n, m, 1.0_dp, t(at), m, x(first, 1), q, 0.0_dp, product(first, 1), q)
+        first = first + m
+        at = at + int(m, long)**2
+      end associate
     end do
-    do k = 1, q
-      left(k, k) = left(k, k) + self%flexible(k)
-      largest = maxval(abs(real(left(k, :), dp)) + abs(aimag(left(k, :))))
-      if (.not. largest > 0) cycle
-      left(k, :) = left(k, :)/largest
-      right(k, :) = right(k, :)/largest
-    end do
-  end subroutine connections
+  end subroutine by_connections
 
-  !> Forces in the connections by forces on a body: (S + T B H B^T)^-1 T B H.
-  subroutine forces_of(own, q, h, w, columns, rows, force)
-    type(body), intent(in) :: own
+  !> A square matrix times T.
+  subroutine before_connections(self, q, t, x, product)
+    type(assembly), intent(in) :: self
     integer, intent(in) :: q
-    complex(dp), intent(in) :: h(*), w(q, q)
-    complex(dp), intent(inout) :: columns(q, size(own%row)), rows(size(own%row), *), force(q, *)
-    integer :: j, k, n_end, n_in
+    complex(dp), intent(in) :: t(*), x(q, q)
+    complex(dp), intent(inout) :: product(q, q)
+    integer :: c, first
+    integer(long) :: at
+
+    first = 1
+    at = 1
+    do c = 1, size(self%block_size)
+      associate (m => self%block_size(c))
+        call product_block(q, m, m, 1.0_dp, x(1, first), q, t(at), m, 0.0_dp, product(1, first), q)
+        first = first + m
+        at = at + int(m, long)**2
+      end associate
+    end do
+  end subroutine before_connections
+
+  !> Motions across the connections by forces on bodies that are not connected: B H.
+  pure subroutine free_motions(self, q, h, motion)
+    type(assembly), intent(in) :: self
+    integer, intent(in) :: q
+    complex(dp), contiguous, intent(in) :: h(:)
+    complex(dp), intent(inout) :: motion(q, *)
+    integer :: b, j, k
     integer(long) :: column
 
-    n_end = size(own%row)
-    n_in = size(own%inputs)
-    if (n_in == 0) return
-    do k = 1, n_end
-      columns(:, k) = w(:, own%row(k))
+    motion(:, :self%n_in) = 0
+    do b = 1, size(self%bodies)
+      associate (own => self%bodies(b))
+        do j = 1, size(own%inputs)
+          column = own%before + int(own%n, long)*(own%inputs(j) - 1)
+          do k = 1, size(own%row)
+            associate (one => motion(own%row(k), own%first_in + j - 1))
+              one = one + own%sign(k)*h(column + own%dof(k))
+            end associate
+          end do
+        end do
+      end associate
     end do
-    do j = 1, n_in
-      column = own%before + int(own%n, long)*(own%inputs(j) - 1)
-      do k = 1, n_end
-        rows(k, j) = own%sign(k)*h(column + own%dof(k))
+  end subroutine free_motions
+
+  subroutine find_forces(self, i, work)
+    type(assembly), intent(in) :: self
+    integer, intent(in) :: i
+    type(line_work), intent(inout) :: work
+    integer :: b
+
+    do b = 1, size(self%bodies)
+      call forces_of(self%bodies(b), self%n_row, self%n_in, self%h(:, i), work%w, work%columns, work%rows, work%force)
+    end do
+  end subroutine find_forces
+
+  subroutine find_responses(self, i, work)
+    type(assembly), intent(in) :: self
+    integer, intent(in) :: i
+    type(line_work), intent(inout) :: work
+    integer :: b
+
+    do b = 1, size(self%bodies)
+      call responses_of(self%bodies(b), self%n_row, self%n_out, self%n_in, self%h(:, i), work%force, work%columns, &
+                        work%rows, self%result(:, :, i))
+    end do
+  end subroutine find_responses
+
+  !> Forces in the connections by forces on a body: (S + T B H B^T)^-1 T B H, a column each connection's row.
+  subroutine forces_of(own, q, n_in, h, w, columns, rows, force)
+    type(body), intent(in) :: own
+    integer, intent(in) :: q, n_in
+    complex(dp), intent(in) :: h(*), w(q, q)
+    complex(dp), intent(inout) :: columns(q, size(own%row)), rows(size(own%inputs), size(own%row)), force(n_in, q)
+    integer :: j, k, n
+    integer(long) :: element
+
+    n = size(own%inputs)
+    if (n == 0) return
+    do k = 1, size(own%row)
+      columns(:, k) = w(:, own%row(k))
+      do j = 1, n
+        element = own%before + int(own%n, long)*(own%inputs(j) - 1) + own%dof(k)
+        rows(j, k) = own%sign(k)*h(element)
       end do
     end do
-    call product_block(q, n_in, n_end, 1.0_dp, columns, q, rows, max(n_end, 1), 0.0_dp, force(1, own%first_in), q)
+    call product_block(n, q, size(own%row), 1.0_dp, rows, n, columns, q, 0.0_dp, force(own%first_in, 1), n_in, .true.)
   end subroutine forces_of
 
   !> Responses of a body: those to its own forces, less those to the forces in the connections.
   subroutine responses_of(own, q, n_out, n_in, h, force, columns, rows, y)
     type(body), intent(in) :: own
     integer, intent(in) :: q, n_out, n_in
-    complex(dp), intent(in) :: h(*), force(q, n_in)
-    complex(dp), intent(inout) :: columns(size(own%outputs), size(own%row)), rows(size(own%row), n_in), y(n_out, n_in)
-    integer :: j, k, n_end, n, last
+    complex(dp), intent(in) :: h(*), force(n_in, q)
+    complex(dp), intent(inout) :: columns(size(own%outputs), size(own%row)), rows(n_in, size(own%row)), y(n_out, n_in)
+    integer :: j, k, n, last
     integer(long) :: column
 
-    n_end = size(own%row)
     n = size(own%outputs)
     if (n == 0) return
     last = own%first_out + n - 1
-    do k = 1, n_end
+    do k = 1, size(own%row)
       column = own%before + int(own%n, long)*(own%dof(k) - 1)
       columns(:, k) = own%sign(k)*h(column + own%outputs)
+      rows(:, k) = force(:, own%row(k))
     end do
-    do j = 1, n_in
-      rows(:, j) = force(own%row, j)
-      y(own%first_out:last, j) = 0
+    call product_block(n, n_in, size(own%row), -1.0_dp, columns, n, rows, n_in, 0.0_dp, y(own%first_out, 1), n_out, &
+                       .true.)
+    do j = own%first_in, own%first_in + size(own%inputs) - 1
+      column = own%before + int(own%n, long)*(own%inputs(j - own%first_in + 1) - 1)
+      y(own%first_out:last, j) = y(own%first_out:last, j) + h(column + own%outputs)
     end do
-    do j = 1, size(own%inputs)
-      column = own%before + int(own%n, long)*(own%inputs(j) - 1)
-      y(own%first_out:last, own%first_in + j - 1) = h(column + own%outputs)
-    end do
-    call product_block(n, n_in, n_end, -1.0_dp, columns, n, rows, max(n_end, 1), 1.0_dp, y(own%first_out, 1), n_out)
   end subroutine responses_of
 
 end module jointfrf_bodies

@@ -202,14 +202,19 @@ contains
   !> C = kept C + factor A B for blocks of larger matrices, with zgemm. What is kept 0 times need not be set.
   !> m, n, k             A is m by k, B is k by n
   !> ld_a, ld_b, ld_c    leading dimensions
-  subroutine product_block(m, n, k, factor, a, ld_a, b, ld_b, kept, c, ld_c)
+  !> b_transposed        whether B lies there as its transpose; not by default
+  subroutine product_block(m, n, k, factor, a, ld_a, b, ld_b, kept, c, ld_c, b_transposed)
     integer, intent(in) :: m, n, k, ld_a, ld_b, ld_c
     real(dp), intent(in) :: factor, kept
     complex(dp), intent(in) :: a(ld_a, *), b(ld_b, *)
     complex(dp), intent(inout) :: c(ld_c, *)
+    logical, intent(in), optional :: b_transposed
+    character :: trans_b
 
     if (min(m, n) == 0) return
-    call zgemm('N', 'N', int(m, blas_ip), int(n, blas_ip), int(k, blas_ip), factor*one, a, int(ld_a, blas_ip), b, &
+    trans_b = 'N'
+    if (present(b_transposed)) trans_b = merge('T', 'N', b_transposed)
+    call zgemm('N', trans_b, int(m, blas_ip), int(n, blas_ip), int(k, blas_ip), factor*one, a, int(ld_a, blas_ip), b, &
                int(ld_b, blas_ip), kept*one, c, int(ld_c, blas_ip), one_char, one_char)
   end subroutine product_block
 

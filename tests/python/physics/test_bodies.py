@@ -116,6 +116,35 @@ def test_frfs_that_are_not_symmetric_and_a_body_that_is_free(bodies):
     assert not found[:, 5:, :5].any()
 
 
+@pytest.mark.parametrize("count", [12, 24], ids=["72 forces, lines side by side", "144 forces, line by line"])
+def test_a_ring_of_many_bodies_is_one_matrix(count):
+    rng, n, f = np.random.default_rng(count), 12, FREQ[:5]
+    dofs = [f"{d}" for d in range(n)]
+    z = np.zeros((f.size, count * n, count * n), complex)
+    bodies, links = {}, []
+    for b in range(count):
+        own, following = slice(b * n, b * n + n), (b + 1) % count
+        root = rng.standard_normal((n, n))
+        # Neither bodies nor joints are reciprocal.
+        stiffness = (1 + 0.02j) * (1e5 * (root @ root.T + 0.1 * root) + 1e4 * np.eye(n))
+        own_z = stiffness - (2 * np.pi * f[:, None, None]) ** 2 * np.eye(n)
+        z[:, own, own] += own_z
+        bodies[f"b{b}"] = jf.FreeBody(np.linalg.inv(own_z), dofs)
+        joint = jf.Joint(1e5 * (3 * np.eye(6) + rng.uniform(-1, 1, (6, 6))), dofs=dofs[:6])
+        links.append(jf.BodyLink(joint, [f"b{b}/{d}" for d in dofs[6:]], [f"b{following}/{d}" for d in dofs[:6]]))
+        place = np.r_[b * n + 6 : b * n + n, following * n : following * n + 6]
+        z[:, place[:, None], place] += np.kron([[1, -1], [-1, 1]], joint.dynamic_stiffness(f))
+    expected = np.linalg.inv(z)
+    limit = {"rtol": 0, "atol": 1e-10 * abs(expected).max()}
+    assert_allclose(jf.couple_bodies(f, bodies, links), expected, **limit)
+    forces = ["b1/0", "b7/3"]
+    some = jf.couple_bodies(f, bodies, links, ["b0/1", "b8/11"], forces)
+    assert_allclose(some, expected[:, [1, 8 * n + 11]][:, :, [n, 7 * n + 3]], **limit)
+    # A line by itself is not computed side by side with others.
+    one = {name: jf.FreeBody(body.h[:1], dofs) for name, body in bodies.items()}
+    assert_allclose(jf.couple_bodies(f[:1], one, links), expected[:1], **limit)
+
+
 def test_a_constraint_that_is_there_twice_is_singular(bodies):
     rigid = jf.LawJoint({}, rigid=["x"])
     links = [jf.BodyLink(rigid, ["A/2:x"], ["B/1:x"])] * 2

@@ -154,6 +154,22 @@ def couple_large(m: Maker) -> Call:
     return Call("couple", args, (m.n_freq, n_a + n_b, n_a + n_b), {"h_a": a, "h_b": b, "k_joint": k})
 
 
+def couple_bodies(m: Maker) -> Call:
+    """Two bodies by a connection of all DOFs of the first but the last, which is rigid."""
+    n_a, n_b, n = m.n, m.n + 1, m.n
+    h = np.concatenate([m.h(size).reshape(m.n_freq, -1) for size in (n_a, n_b)], axis=1)
+    t = np.concatenate([m.k(n - 1).reshape(m.n_freq, -1), np.ones((m.n_freq, 1))], axis=1)
+    ends = np.stack([m.dofs(n, n_a), n_a + m.dofs(n, n_b)], axis=1).astype(np.int32)
+    connection, rigid = np.ones((2, n), np.int32)
+    connection[-1], rigid[:-1] = 1 + (n > 1), 0
+    every = np.arange(1, n_a + n_b + 1, dtype=np.int32)
+    args = [
+        2, n, h.shape[1], t.shape[1], every.size, every.size, m.n_freq, np.array([n_a, n_b], np.int32), ends,
+        connection, rigid, h, t, every, every,
+    ]  # fmt: skip
+    return Call("couple_bodies", args, (m.n_freq, every.size, every.size), {"h": h, "t": t})
+
+
 def modify(m: Maker) -> Call:
     n_m = (m.n + 1) // 2
     alpha, d = m.h(m.n), m.k(n_m)
@@ -222,9 +238,9 @@ def transform(m: Maker) -> Call:
 OPERATIONS = {
     f.__name__: f
     for f in (
-        invert, solve, solve_one, receptance, receptance_plain, receptance_banded, receptance_modal, couple, modify,
-        find_modification, ismm, inverse_substructuring, joint_compliance, compliance_factors, compliance_covariance,
-        central_difference, transform,
+        invert, solve, solve_one, receptance, receptance_plain, receptance_banded, receptance_modal, couple,
+        couple_bodies, modify, find_modification, ismm, inverse_substructuring, joint_compliance, compliance_factors,
+        compliance_covariance, central_difference, transform,
     )
 } | {f"decouple_{equation}": decouple(equation) for equation in ("rr", "rs", "sr", "ss")}  # fmt: skip
 #: The covariance of n^2 entries grows with n^4, a band matrix and a joint's matrices of these orders take long.
