@@ -31,6 +31,8 @@ __all__ = ["CalibrationErrors", "ErrorKind", "SetUpErrors", "calibration_errors"
 #: Functions of frequency that may be calibration, about as slow as an eighth of the band; as many faster ones show the
 #: noise. Lines that each needs.
 _SLOW, _LINES = 8, 20
+#: Polynomials of which the square of frequency is made.
+_OF_SQUARES = 3
 #: Probability at which a sum of squares that exceeds that of noise is taken for chance: sixteen sums are looked at, so
 #: that calibration is seen where there is none in 1.6 % of the tests.
 _CHANCE = 0.001
@@ -123,11 +125,17 @@ class CalibrationErrors:
         Significant factors of (h_pq - h_qp) over the mean of both.
     setups : SetUpErrors, optional
         Where the FRFs are of several set-ups, or a gain that all share was said.
+    resonant : bool
+        Whether the gains of channels differ by the square of frequency and nothing else, as those of sensors do that
+        resonate far above the band.
 
     Notes
     -----
     The functions of the gain are Legendre polynomials; those of the phase a delay, which is proportional to frequency,
-    and polynomials that are orthogonal to it.
+    and polynomials that are orthogonal to it. Where sensors are resonant the first function of the gain is the square
+    of frequency, the others are orthogonal to it. Such errors have one sign: their mean over the channels, which no
+    difference shows, is as large as their scatter where half of the sensors resonate. It is an error of all FRFs with
+    the variance of g_p - f_p.
     """
 
     span: tuple[float, float]
@@ -139,14 +147,33 @@ class CalibrationErrors:
     columns: NDArray[np.intp]
     differences: FloatArray
     setups: SetUpErrors | None = None
+    resonant: bool = False
 
     def functions(self, freq_hz: FloatArray) -> FloatArray:
         """Return the functions of gain and phase, shape (2, n_functions, n_freq)."""
-        return _functions(self.span, self.channel.shape[1], freq_hz.tobytes())
+        return _functions(self.span, self.channel.shape[1], freq_hz.tobytes(), self.resonant)
+
+    def _common(self) -> tuple[FloatArray, FloatArray]:
+        """Return variances and degrees of freedom of errors that all FRFs share."""
+        variance, degrees = np.zeros_like(self.channel), np.full_like(self.channel, np.inf)
+        if self.setups is not None:
+            variance[0, 0] = self.setups.common
+        if self.resonant:
+            # The delay is that of the damping of the same resonance, unless phases differ by more.
+            for part in (0,) if self.channel[1, 1:].any() else (0, 1):
+                variance[part, 0], degrees[part, 0] = self.channel[part, 0], self.channel_degrees[part, 0]
+        return variance, degrees
+
+    def resonance(self) -> float:
+        """Return the frequency in Hz at which one of two sensors resonates that differ as the most different ones."""
+        assert self.resonant
+        most = float(abs(self.differences[:, 0, 0]).max())
+        highest = np.array([self.span[1]])
+        return self.span[1] / float(np.sqrt(most * self.functions(highest)[0, 0, 0]))
 
     def variance(self, freq_hz: FloatArray) -> FloatArray:
         """Return E|g_p + f_q + u_s + e_pq|^2 of each line, shape (n_freq,)."""
-        variance = self.channel + self.own
+        variance = self.channel + self.own + self._common()[0]
         if self.setups is not None:
             variance = variance + self.setups.variance
         return np.asarray(np.einsum("ab,abl->l", variance, self.functions(freq_hz) ** 2))
@@ -172,10 +199,8 @@ class CalibrationErrors:
             ("own", self.own, self.own_degrees),
         ]
         if self.setups is not None:
-            common = np.zeros_like(self.channel)
-            common[0, 0] = self.setups.common
             found.append(("setup", self.setups.variance, self.setups.degrees))
-            found.append(("common", common, np.full_like(common, np.inf)))
+        found.append(("common", *self._common()))
         return [one for one in found if one[1].any()]
 
     def masks(self, kind: ErrorKind, shape: tuple[int, int]) -> NDArray[np.bool_]:
@@ -246,32 +271,17 @@ def calibration_errors(
         differences = _differences(h, again, reciprocal=reciprocal)
     if differences is None:
         return _as_said(span, setups)
-    factors = _factors(differences, _functions(span, 2 * n_slow, freq.tobytes()), _mixture(span))
-    by_noise = _squares(factors, 1 / factors.variance, differences)
-    found = np.zeros((2, 3, 2, n_slow))  # variance and degrees; set-up, channel and own; gain and phase
-    reference = by_noise[..., n_slow:].sum(axis=3)
-    # Functions 0, 1, 2 to 3, 4 to 7 are about as fast.
-    first = [one for one in (0, 1, 2, 4) if one < n_slow]
-    tested = np.add.reduceat(by_noise[..., :n_slow], first, axis=3)
-
-    @cache
-    def sized() -> FloatArray:
-        # Errors far above the noise count alike, however small the noise of a pair is.
-        alike = _squares(factors, np.ones((len(factors.value), 1, 1)), differences)
-        return np.asarray(np.add.reduceat(alike[..., :n_slow], first, axis=3))
-
     said = None if setups is None else setups.gain
-    exceeds = False
-    for part in range(2):
-        for i, own in enumerate(map(slice, first, [*first[1:], n_slow])):
-            variance_and_degrees = _variances(
-                tested[:, :, part, i], sized, (part, i), reference[:, :, part],
-                said if i == part == 0 else None, always=i == 0,
-            )  # fmt: skip
-            found[:, :, part, own] = variance_and_degrees[:, :, None]
-            if i == part == 0 and said is not None:
-                exceeds = bool(np.isfinite(variance_and_degrees[1, 0]))
-    variance, degrees = found
+    factors = _factors(differences, span, freq, 2 * n_slow)
+    variance, degrees, exceeds = _split(factors, differences, n_slow, said)
+    resonant = False
+    if setups is None and variance[1, 0, 1:].any() and n_slow >= _OF_SQUARES:
+        # Several functions that are one: the square of frequency.
+        of_squares = _factors(differences, span, freq, 2 * n_slow, resonant=True)
+        other = _split(of_squares, differences, n_slow, said)
+        of_gain = other[0][:, 0]
+        if resonant := bool(of_gain[1, 0] > 0 and not of_gain[1, 1:].any() and not of_gain[2].any()):
+            factors, (variance, degrees, exceeds) = of_squares, other
     errors = None
     if setups is not None:
         deviations = _deviations(factors, differences, setups, variance, span)
@@ -283,8 +293,41 @@ def calibration_errors(
     significant = np.where(variance.any(axis=0), factors.value[ways][:, :, :n_slow], 0)
     return CalibrationErrors(
         span, variance[1], variance[2], degrees[1], degrees[2], differences.rows[ways], differences.columns[ways],
-        significant, errors,
+        significant, errors, resonant,
     )  # fmt: skip
+
+
+def _split(
+    factors: _Factors, differences: _Differences, n_slow: int, said: float | None
+) -> tuple[FloatArray, FloatArray, bool]:
+    """Return variances and degrees of freedom of set-ups, channels and FRFs, and whether set-ups exceed what was said.
+
+    Of shape (3, 2, n_slow): gain and phase of each.
+    """
+    by_noise = _squares(factors, 1 / factors.variance, differences)
+    found = np.zeros((2, 3, 2, n_slow))
+    reference = by_noise[..., n_slow:].sum(axis=3)
+    # Functions 0, 1, 2 to 3, 4 to 7 are about as fast.
+    first = [one for one in (0, 1, 2, 4) if one < n_slow]
+    tested = np.add.reduceat(by_noise[..., :n_slow], first, axis=3)
+
+    @cache
+    def sized() -> FloatArray:
+        # Errors far above the noise count alike, however small the noise of a pair is.
+        alike = _squares(factors, np.ones((len(factors.value), 1, 1)), differences)
+        return np.asarray(np.add.reduceat(alike[..., :n_slow], first, axis=3))
+
+    exceeds = False
+    for part in range(2):
+        for i, own in enumerate(map(slice, first, [*first[1:], n_slow])):
+            variance_and_degrees = _variances(
+                tested[:, :, part, i], sized, (part, i), reference[:, :, part],
+                said if i == part == 0 else None, always=i == 0,
+            )  # fmt: skip
+            found[:, :, part, own] = variance_and_degrees[:, :, None]
+            if i == part == 0 and said is not None:
+                exceeds = bool(np.isfinite(variance_and_degrees[1, 0]))
+    return found[0], found[1], exceeds
 
 
 def _as_said(span: tuple[float, float], setups: SetUps | None) -> CalibrationErrors | None:
@@ -303,22 +346,31 @@ def shows_calibration(h: ComplexArray) -> bool:
 
 
 @lru_cache(maxsize=8)
-def _functions(span: tuple[float, float], number: int, lines: bytes) -> FloatArray:
+def _functions(span: tuple[float, float], number: int, lines: bytes, resonant: bool = False) -> FloatArray:
     """Return functions of gain and phase of mean square 1 over the band, shape (2, number, n_freq), of lines in Hz."""
     middle, half = (span[1] + span[0]) / 2, (span[1] - span[0]) / 2
-    gain = legendre.legvander((np.frombuffer(lines) - middle) / half, max(number, 2) - 1).T
-    gain *= np.sqrt(2 * np.arange(len(gain)) + 1)[:, None]
-    phase = gain.copy()
-    phase[:2] = _mixture(span) @ gain[:2]
-    found = np.asarray(np.stack([gain, phase])[:, :number], float)
+    whole = legendre.legvander((np.frombuffer(lines) - middle) / half, max(number, 2) - 1).T
+    whole *= np.sqrt(2 * np.arange(len(whole)) + 1)[:, None]
+    both = np.stack([whole, whole])
+    first = min(_OF_SQUARES, len(whole))
+    both[:, :first] = _mixtures(span, resonant)[:, :first, :first] @ both[:, :first]
+    found = np.asarray(both[:, :number], float)
     found.flags.writeable = False
     return found
 
 
-def _mixture(span: tuple[float, float]) -> FloatArray:
-    """Return the matrix from the first two functions of the gain to those of the phase; it is its own inverse."""
-    slow, fast = (span[1] + span[0]) / 2, (span[1] - span[0]) / np.sqrt(12)
-    return np.asarray(np.array([[slow, fast], [fast, -slow]]) / np.hypot(slow, fast))
+def _mixtures(span: tuple[float, float], resonant: bool) -> FloatArray:
+    """Return the orthogonal matrices from the first Legendre polynomials to functions of gain and phase, (2, 3, 3)."""
+    middle, half = (span[1] + span[0]) / 2, (span[1] - span[0]) / 2
+    found = np.stack([np.eye(_OF_SQUARES)] * 2)
+    slow, fast = middle, half / np.sqrt(3)
+    found[1, :2, :2] = np.array([[slow, fast], [fast, -slow]]) / np.hypot(slow, fast)
+    if resonant:
+        # The reflection whose first row is the square of frequency in polynomials of mean square 1.
+        square = np.array([middle**2 + half**2 / 3, 2 * middle * half / np.sqrt(3), half**2 * 2 / np.sqrt(45)])
+        apart = square / np.linalg.norm(square) - np.eye(_OF_SQUARES)[0]
+        found[0] -= 2 * np.outer(apart, apart) / (apart @ apart)
+    return found
 
 
 class _Differences(NamedTuple):
@@ -420,7 +472,10 @@ class _Factors(NamedTuple):
     turning: ComplexArray
 
 
-def _factors(differences: _Differences, functions: FloatArray, mixture: FloatArray) -> _Factors:
+def _factors(
+    differences: _Differences, span: tuple[float, float], freq: FloatArray, number: int, *, resonant: bool = False
+) -> _Factors:
+    functions, (of_gains, of_phases) = _functions(span, number, freq.tobytes(), resonant), _mixtures(span, resonant)
     mean, root = differences.mean, np.sqrt(differences.noise)
     outlying = line_levels(differences.values / root, is_residual=False).factor > 1
     inverse = np.where(outlying, 0, 1 / root)
@@ -429,10 +484,11 @@ def _factors(differences: _Differences, functions: FloatArray, mixture: FloatArr
     size = size * inverse
     gain = functions[0]
     of_gain = np.linalg.pinv((size[:, None] ** 2 * gain) @ gain.T, hermitian=True)
-    # The functions of the phase are those of the gain but for the first two: one inverse serves both.
-    both = np.stack([of_gain, of_gain], axis=1)
-    both[:, 1, :2] = mixture @ both[:, 1, :2]
-    both[:, 1, :, :2] = both[:, 1, :, :2] @ mixture
+    # The functions of the phase are those of the gain but for the first ones: one inverse serves both.
+    both, first = np.stack([of_gain, of_gain], axis=1), min(_OF_SQUARES, number)
+    mixture = (of_phases @ of_gains.T)[:first, :first]
+    both[:, 1, :first] = mixture @ both[:, 1, :first]
+    both[:, 1, :, :first] = both[:, 1, :, :first] @ mixture.T
 
     def solve(turned: ComplexArray) -> tuple[FloatArray, FloatArray]:
         # A real factor changes the part along h, an imaginary one the part across it.

@@ -782,6 +782,12 @@ def _calibration(errors: CalibrationErrors | None) -> list[Finding]:
         f"h_pq and h_qp differ smoothly over frequency, {', '.join(parts)} (root mean square over the band): taken for "
         "calibration, not noise; intervals allow for as much in what h_pq and h_qp have in common"
     )
+    if errors.resonant:
+        text += (
+            f"; gains differ by the square of frequency, as where some sensors, or how they are mounted, resonate at "
+            f"about {errors.resonance():.2g} Hz: all FRFs may then be too large by that, which intervals allow for "
+            f"where sensors differ, and no FRF shows where all resonate alike"
+        )
     return [*found, note("calibration", text)]
 
 

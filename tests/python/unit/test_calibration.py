@@ -118,6 +118,45 @@ def test_noise_is_rarely_taken_for_calibration(h, kind):
     assert found <= stats.binom.ppf(0.999, 60, 0.1 if "25" in kind else 0.016)
 
 
+def resonant(which, resonance=8e3):
+    """Factor of FRFs, by sensors that resonate, damping 1/60."""
+    x = FREQ[:, None, None] / resonance
+    return np.where(np.array(which, bool)[:, None], 1 / (1 - x**2 + 1j * x / 30), 1)
+
+
+def test_resonances_of_sensors_are_one_function_of_frequency(h):
+    """Differences by the square of frequency, from two of four sensors; mean squares over the band by hand."""
+    found = calibration_errors(FREQ, noisy(h * resonant([1, 0, 1, 0])))
+    assert found.resonant
+    assert found.resonance() == pytest.approx(8e3, rel=0.05)
+    gain = found.functions(FREQ)[0]
+    np.testing.assert_allclose(gain[0], FREQ**2 / np.sqrt((801**5 - 15**5) / 5 / 786), rtol=0.01)
+    np.testing.assert_allclose(gain @ gain.T / FREQ.size, np.eye(8), atol=0.06)
+    # Two and two: a variance of 4 / 12 of the square of the relative error.
+    assert found.channel[0, 0] == pytest.approx(np.mean((FREQ / 8e3) ** 4) / 3, rel=0.1)
+    assert not found.channel[0, 1:].any()
+    shared = {kind: variance for kind, variance, _ in found.kinds()}["common"]
+    np.testing.assert_array_equal(shared, found.channel * (np.arange(8) == 0))
+
+
+def test_gains_drifts_and_noise_are_no_resonances(h):
+    half_a_wave = np.cos(np.pi * FREQ / 800)[:, None, None]
+    for seed in range(20):
+        for factor in (gains(seed), 1 + (gains(seed, 0.01) - 1) * half_a_wave):
+            assert not calibration_errors(FREQ, noisy(h * factor, seed=seed)).resonant
+
+
+@pytest.mark.parametrize("which", [[1, 0, 0, 0], [1, 1, 0, 1]])
+def test_intervals_allow_for_resonances_of_some_sensors(h, which):
+    fit = jf.identify(FREQ, noisy(h * resonant(which), 0.01), TRUE.dofs, damping="viscous")
+    (said,) = (one.text for one in fit.findings if one.kind == "calibration")
+    assert "sensors, or how they are mounted, resonate at about " in said
+    interval = fit.confidence_interval()
+    for name, true in {"k_y": 6e5, "k_theta": 5e3, "c_y": 20.0, "c_theta": 1.5}.items():
+        low, high = interval[name]
+        assert low <= true <= high
+
+
 def test_what_cannot_show_calibration(h):
     polluted = noisy(h * gains(1))
     assert calibration_errors(FREQ, (polluted + polluted.swapaxes(1, 2)) / 2) is None
