@@ -12,8 +12,8 @@ from simulated_tests import FAULTS, check_with_fault, simulated_test
 RARELY_SEEN = {"two responses exchanged", "two impacts exchanged", "sensor at another place"}
 
 
-# Of the last, most channels move in some columns by rounding only.
-@pytest.mark.parametrize("seed", [*range(4), 2187, 2395])
+# 2015: a resonance narrower than lines are apart. Of the last, most channels move in some columns by rounding only.
+@pytest.mark.parametrize("seed", [*range(4), 2015, 2187, 2395])
 def test_nothing_is_found_where_nothing_is_wrong(seed):
     assert simulated_test(seed).check().ok
 

@@ -148,15 +148,15 @@ def _basis(x: FloatArray, poles: ComplexArray, powers: int) -> ComplexArray:
 
 
 def _look(freq_hz: FloatArray, h: ComplexArray) -> _Peak | None:
-    """Test one resonance: lines, and FRFs of shape (n_freq, n); None where its pole is not found."""
+    """Test one resonance: lines, and FRFs of shape (n_freq, n); None where lines do not show its pole."""
     half = (freq_hz[-1] - freq_hz[0]) / 2
     x = (freq_hz - freq_hz[0]) / half - 1
     h = h / abs(h).max(axis=0)
     size = np.linalg.norm(h, axis=1)
     width = max(float(np.ptp(x[size > size.max() / np.sqrt(2)])) / 2, float(x[1] - x[0]))
     alone = _poles(x, h, np.array([x[np.argmax(size)] + 1j * width]))
-    if alone is None:
-        return None
+    if alone is None or 2 * alone[0][0].imag < x[1] - x[0]:
+        return None  # narrower than the lines are apart: one line is the peak, and its noise is all of it
     one, left = _moved(x, h, *alone, _ALONE)
     size = np.linalg.norm(left, axis=1)
     usual = size < _OUTLYING * np.median(size)
