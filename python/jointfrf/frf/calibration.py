@@ -165,11 +165,11 @@ class CalibrationErrors:
         return variance, degrees
 
     def resonance(self) -> float:
-        """Return the frequency in Hz at which one of two sensors resonates that differ as the most different ones."""
-        assert self.resonant
+        """Return at which frequency, Hz, one of the most different two sensors resonates; inf where none is seen."""
+        if not self.resonant:
+            return np.inf
         most = float(abs(self.differences[:, 0, 0]).max())
-        highest = np.array([self.span[1]])
-        return self.span[1] / float(np.sqrt(most * self.functions(highest)[0, 0, 0]))
+        return self.span[1] / float(np.sqrt(most * self.functions(np.array([self.span[1]]))[0, 0, 0]))
 
     def variance(self, freq_hz: FloatArray) -> FloatArray:
         """Return E|g_p + f_q + u_s + e_pq|^2 of each line, shape (n_freq,)."""
