@@ -251,16 +251,20 @@ class InterfaceFrfs(NamedTuple):
         sides = entries.rows // n + entries.columns // n
         for block in (np.flatnonzero(sides == one) for one in np.unique(sides)):
             p, q = entries.rows[block], entries.columns[block]
-            of_channels = t_r[:, p, :, None] * t_f[:, q, None, :]
-            if self.reciprocal:
-                of_channels = (of_channels + t_r[:, q, :, None] * t_f[:, p, None, :]) / 2
+            # Entry i is a sum over pairs of channels h_ab, of those that enter the block at all.
+            ways = [(p, q), (q, p)] if self.reciprocal else [(p, q)]
+            used = [((t_r[:, i] != 0).any(axis=0), (t_f[:, k] != 0).any(axis=0)) for i, k in ways]
+            pairs = np.any([(own[:, :, None] & other[:, None]).any(axis=0) for own, other in used], axis=0)
             if self.symmetrised:
-                of_channels = np.triu(of_channels + np.triu(of_channels.swapaxes(2, 3), 1))
-            weighted = of_channels * std[:, None]
-            dead = ((of_channels != 0) & ~known[:, None]).any(axis=(2, 3))
-            weighted = weighted.reshape(*weighted.shape[:2], -1)
-            weighted = np.ascontiguousarray(weighted[:, :, weighted.any(axis=(0, 1))])
-            covariance = (weighted @ weighted.conj().swapaxes(1, 2)).real
+                pairs = np.triu(pairs | pairs.T)
+            a, b = np.nonzero(pairs)
+            of_channels = _mean_product(t_r, t_f, ways, (a, b))
+            if self.symmetrised:
+                of_channels += np.where(a < b, _mean_product(t_r, t_f, ways, (b, a)), 0)
+            dead = ((of_channels != 0) & ~known[:, None, a, b]).any(axis=2)
+            weighted = of_channels * std[:, None, a, b]
+            parts = np.concatenate([weighted.real, weighted.imag], axis=2)
+            covariance: FloatArray = parts @ parts.swapaxes(1, 2)
             if errors is not None:
                 # Real and imaginary part each as a direction of its own: the covariance stays real.
                 own = np.concatenate([errors.real, errors.imag], axis=1)[:, :, block]
@@ -272,6 +276,17 @@ class InterfaceFrfs(NamedTuple):
             covariance *= size[:, :, None] * size[:, None, :]
             whitening[:, block[:, None], block] = _triangles(covariance, dead)
         return inverse_std, whitening
+
+
+def _mean_product(
+    t_r: ComplexArray,
+    t_f: ComplexArray,
+    ways: list[tuple[NDArray[np.intp], NDArray[np.intp]]],
+    pairs: tuple[NDArray[np.intp], NDArray[np.intp]],
+) -> ComplexArray:
+    """Return what pairs of channels have in entries, in the mean over the ways to them, shape (n_freq, q, n_pairs)."""
+    total: ComplexArray = np.sum([t_r[:, p][:, :, pairs[0]] * t_f[:, q][:, :, pairs[1]] for p, q in ways], axis=0)
+    return total / len(ways)
 
 
 def direction_share(variance: FloatArray) -> FloatArray:
