@@ -353,7 +353,8 @@ def _from_lines(search: _Search) -> GroupFit | None:
     if joint.in_compliance and joint.n > 1:
         return None
     found = fit_dofs(problem, search.starts)
-    if found.is_good or problem.sides_bend or not isinstance(joint, CoupledJoint) or not joint.terms.has_cross_terms:
+    is_last = found.is_good or (problem.sides_bend and not found.is_lost)
+    if is_last or not isinstance(joint, CoupledJoint) or not joint.terms.has_cross_terms:
         return found
     return min([found, *_from_diagonal(problem, joint)], key=lambda one: one.squares)
 

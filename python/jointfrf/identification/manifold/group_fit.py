@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from jointfrf.frf.bands import in_pieces, is_long
-from jointfrf.identification.manifold.line_forms import FormMinimum, JointCoordinates, LineForms
+from jointfrf.identification.manifold.line_forms import FormMinimum, FormSquares, JointCoordinates, LineForms
 from jointfrf.identification.manifold.on_manifold import (
     LineData,
     OnManifold,
@@ -65,6 +65,9 @@ _POORLY = 0.05
 _REVERSED, _SHRUNK = -0.8, 0.5
 #: Least part of such a step that is taken; a fit for which that is too much ends where it is.
 _LEAST_SHARE = 0.1
+#: Ends no farther apart than this, in standard errors, root mean square: between them a fit has converged. Along a
+#: direction in which -2 log likelihood is that flat, higher powers than squares count, which no step knows.
+_SWINGS = 0.5
 #: Starts of a fit where the sides bend.
 _FEW_STARTS = 2
 #: Targets whose gradients are found together.
@@ -387,6 +390,9 @@ def _iterated(
         moved = float(np.sqrt(abs(2 * (change @ minimum.information @ change))))
         is_lost = minimum.cost > _LOST * count
         converged = choice_of_m.holds_for(minimum, step) and bool(moved < _MOVED * np.sqrt(x.size)) and step > 1
+        if length.is_spent and not converged and moved < _SWINGS * np.sqrt(x.size):
+            # Between the two ends, a tenth of the way of which was the last step.
+            minimum, converged = FormMinimum(x, *FormSquares(forms, joint).linearised(x), forms, joint), True
         if converged or step == _MOST or length.is_spent or (is_lost and step > patience):
             kept = None if is_long(len(data.measured)) else on
             return GroupFit.of(
