@@ -25,7 +25,7 @@ from jointfrf.spelling import did_you_mean
 if TYPE_CHECKING:
     from jointfrf.report.sketch import SketchedPart
 
-__all__ = ["MeasuredAssembly", "measured_assembly"]
+__all__ = ["MeasuredAssembly", "joint_words", "measured_assembly"]
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,8 @@ class MeasuredAssembly:
 
     @property
     def sketched(self) -> tuple[SketchedPart, ...]:
-        """Both parts as `write_report` draws them; none of parts and joints by names."""
-        return tuple(part.sketched(name) for name, part in self.parts.items()) if "A" in self.parts else ()
+        """All parts as `write_report` draws them."""
+        return tuple(part.sketched(name, self.assembly.joints) for name, part in self.parts.items())
 
     def describe(self) -> list[str]:
         """Say in words what a sketch shows, and what the files of the parts hold, line by line.
@@ -85,8 +85,7 @@ class MeasuredAssembly:
         mass, centre of gravity, rigid motions, natural frequencies of parts from files, and what looks wrong.
         """
         parts = self.parts
-        words = [_joint_words(name, one, parts) for name, one in self.assembly.joints.items()]
-        lines = [*words, *columns_of(_node_rows(self, parts)), *self.located]
+        lines = [*joint_words(self.assembly.joints, parts), *columns_of(_node_rows(self, parts)), *self.located]
         lines += [f"{name}: {line}" for name, part in parts.items() for line in part.describe()]
         return lines + ([f"not used: {', '.join(self.unused)}"] if self.unused else [])
 
@@ -109,6 +108,11 @@ class MeasuredAssembly:
             coherence=coherence, averages=averages, setups=self.setups,
             find_wrong_channels=find_wrong_channels, accept_bent=accept_bent,
         )  # fmt: skip
+
+
+def joint_words(joints: Mapping[str, PlacedJoint], parts: Mapping[str, AssemblyPart]) -> list[str]:
+    """Say between which nodes each joint acts, where they are, and how."""
+    return [_joint_words(name, one, parts) for name, one in joints.items()]
 
 
 def _joint_words(name: str, one: PlacedJoint, parts: Mapping[str, AssemblyPart]) -> str:

@@ -135,11 +135,16 @@ class AssemblyPart:
         patches = self.structure.patches if isinstance(self.structure, ModelStructure) else ()
         return next((one for one in patches if nodes == {one.name}), None)
 
-    def sketched(self, letter: str) -> SketchedPart:
+    def sketched(self, letter: str, joints: Mapping[str, PlacedJoint]) -> SketchedPart:
         """Return it as a sketch draws it."""
         from jointfrf.report.sketch import SketchedPart  # reports take their time to import
 
-        return SketchedPart(letter, self.places, [dof.rpartition(":")[0] for dof in self.keys.joint])
+        at: dict[str, list[str]] = {}
+        for name, joint in joints.items():
+            ends = (dof.rpartition(":")[0].partition("/") for dof in (*joint.j, *joint.k))
+            if nodes := list(dict.fromkeys(node for part, _, node in ends if part == letter)):
+                at[name] = nodes
+        return SketchedPart(letter, self.places, at)
 
     def describe(self) -> list[str]:
         """Say what shows that files hold the right thing, line by line; nothing of parts that are built or of FRFs."""

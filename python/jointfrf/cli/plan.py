@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from jointfrf.assembly_file.keys import ReceptancesPart
+from jointfrf.assembly_file.measured import joint_words
 from jointfrf.assembly_file.read import AssemblyPart, check_dofs, named_dof, read_assembly_file
 from jointfrf.cases.catalogue import read_case_and_kind
 from jointfrf.cases.known_joint.exact import exact_frfs
@@ -128,16 +129,19 @@ def run(args: argparse.Namespace) -> int:
         warn_of_ignored(args, ("--candidates",), "--sensors and --hits name them")
     used = list(dict.fromkeys(dof for own in (*chosen, *kept) for dof in own))
     with waiting(f"plan of {args.model.name}"):
+        assembly = file.assembly(freq, parts, used)
         found = plan(
-            file.assembly(freq, parts, used), freq, chosen[0], chosen[1], noise=args.noise, floor=args.floor or 0.0,
+            assembly, freq, chosen[0], chosen[1], noise=args.noise, floor=args.floor or 0.0,
             averages=args.averages, targets=args.targets, criterion=args.criterion, within=args.within,
             budget=args.budget, sensor_price=args.sensor_price, hit_price=args.hit_price, sensors=kept[0], hits=kept[1],
             sensor_mass=args.sensor_mass or 0.0, fixed=file.keys.fixed,
         )  # fmt: skip
     written = []
     if args.report is not None:
-        sketched = [part.sketched(letter) for letter, part in parts.items()] if "A" in parts else []
+        sketched = [part.sketched(letter, assembly.joints) for letter, part in parts.items()]
         written.append(write_plan(found, args.report, parts=sketched, command=args.typed))
+    if len(assembly.joints) > 1:
+        out.say(*joint_words(assembly.joints, parts), "")
     out.say(found)
     needed = None
     if args.spread is not None:

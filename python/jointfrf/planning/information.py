@@ -172,8 +172,13 @@ class PlannedTest:
         # Joints whose spread is to be found are each for itself before that.
         known = tuple(one for one in found.means if one.relative is not None)
         unknown = {one.mean for one in found.means} - {one.mean for one in known}
+        values = found.with_means(found.values)
         return ParameterVector(
-            tuple(one._replace(is_free=one.is_free and i not in unknown) for i, one in enumerate(found.all)), known
+            tuple(
+                one._replace(is_free=one.is_free and i not in unknown, value=float(values[i]))
+                for i, one in enumerate(found.all)
+            ),
+            known,
         )
 
     def _part(

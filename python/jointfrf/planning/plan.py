@@ -209,7 +209,8 @@ def plan(
     averages : float
         Averages of each FRF.
     targets : sequence of str, optional
-        Parameters that are to be found; all of the joint by default.
+        Parameters that are to be found: those of joints by default. Unknowns of models, and means of joints that are
+        alike with a spread that is given, can be named.
     criterion : {"A", "D"}
         What the choice makes small: the mean of the squared relative errors of the targets, or the volume of their
         ellipsoid. One target alone is c-optimality.
@@ -303,7 +304,12 @@ def _targets(vector: ParameterVector, names: tuple[str, ...] | None) -> NDArray[
     chosen = names or tuple(one.name for one in vector.fitted if one.origin == "joint")
     if not chosen:
         raise ValueError("there is nothing to find: all parameters of the joint are fixed")
+    open_means = [one.name for one in vector.all if one.origin == "mean" and not one.is_free]
     for name in chosen:
+        if name in open_means:
+            raise ValueError(
+                f"{name} is the mean of joints whose spread is not known: a plan for it needs their `spread`"
+            )
         if name not in fitted:
             raise ValueError(f"no unknown is called {one_line(name)}{did_you_mean(name, fitted)}")
         if vector.fitted[fitted.index(name)].value == 0:

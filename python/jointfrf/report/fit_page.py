@@ -107,8 +107,8 @@ def write_report(
     nodes : sequence of two or four int
         Nodes j and k of the finite-element cards; then ROT NODEs of CalculiX.
     parts : sequence of SketchedPart
-        Both parts of an assembly with the places of their nodes, as `MeasuredAssembly.sketched`: they are drawn with
-        channels and joint.
+        All parts of an assembly with the places of their nodes, as `MeasuredAssembly.sketched`: they are drawn with
+        channels and joints.
     space : bool
         Whether the page has a view in space of channels, forces and joint, with the deformation measured and fitted at
         each frequency, moving. It needs plotly, whose script makes the page 5 MB larger, and WebGL where it is read.

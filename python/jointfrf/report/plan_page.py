@@ -69,7 +69,7 @@ def write_plan(
     path : Path or str
         In a folder that exists.
     parts : sequence of SketchedPart
-        Where the nodes of both parts are, for a drawing of sensors and hits.
+        Where the nodes of all parts are, for a drawing of joints, sensors and hits.
     command : str
         How it was made, as typed.
 

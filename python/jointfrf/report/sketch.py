@@ -303,24 +303,56 @@ def _axes(height: float, view: FloatArray = _VIEW) -> str:
 
 
 class SketchedPart(NamedTuple):
-    """A part of an assembly: its letter, where its nodes are, m, in axes of its own, and its nodes at the joint."""
+    """A part of an assembly: its name, where its nodes are, m, in axes of its own, and which are at which joint."""
 
     letter: str
     places: Mapping[str, FloatArray]
-    joint: Sequence[str]
+    joints: Mapping[str, Sequence[str]]
+
+    def ends(self) -> dict[str, FloatArray]:
+        """Return where it has each joint, m, as far as that is known."""
+        known = {
+            name: [self.places[node] for node in nodes if node in self.places] for name, nodes in self.joints.items()
+        }
+        return {name: np.mean(own, axis=0) for name, own in known.items() if own}
 
 
-def moved_parts(parts: Sequence[SketchedPart]) -> tuple[list[dict[str, FloatArray]], FloatArray] | None:
-    """Return places of nodes with all parts where they meet the first, and where that is, m; None if not known."""
-    ends = [[part.places[node] for node in part.joint if node in part.places] for part in parts]
+def moved_parts(
+    parts: Sequence[SketchedPart],
+) -> tuple[list[dict[str, FloatArray]], dict[str, dict[int, FloatArray]]] | None:
+    """Return places of nodes with all parts where they meet, and the ends of joints, m; None where a part meets none.
+
+    The first part stays where it is. One after the other the rest follows, each to where its joints with those before
+    it lie in the mean on theirs.
+    """
+    ends = [part.ends() for part in parts]
+    shift: dict[int, FloatArray] = {0: np.zeros(3)}
+    while len(shift) < len(parts):
+        for i, own in enumerate(ends):
+            met = [ends[k][name] + by - own[name] for k, by in shift.items() for name in own.keys() & ends[k].keys()]
+            if i not in shift and met:
+                shift[i] = np.mean(met, axis=0)
+                break
+        else:
+            return None
     if not all(ends):
         return None
-    reference = np.mean(ends[0], axis=0)
-    moved = [
-        {node: at - np.mean(end, axis=0) + reference for node, at in part.places.items()}
-        for part, end in zip(parts, ends, strict=True)
-    ]
-    return moved, reference
+    moved = [{node: at + shift[i] for node, at in part.places.items()} for i, part in enumerate(parts)]
+    joints: dict[str, dict[int, FloatArray]] = {}
+    for i, own in enumerate(ends):
+        for name, at in own.items():
+            joints.setdefault(name, {})[i] = at + shift[i]
+    return moved, joints
+
+
+def _levels(count: int, joints: Mapping[str, Mapping[int, FloatArray]]) -> list[int]:
+    """Return how many joints lead from the first part to each: neighbours are drawn apart, and in other colours."""
+    levels = {0: 0}
+    while len(levels) < count:
+        level = max(levels.values()) + 1
+        next_to = {i for own in joints.values() if own.keys() & levels.keys() for i in own} - levels.keys()
+        levels.update(dict.fromkeys(next_to, level))
+    return [levels[i] for i in range(count)]
 
 
 #: Nodes of a part that are drawn at most: more are a grey body.
@@ -328,19 +360,20 @@ _MOST_NODES = 400
 
 
 def assembly_sketch(parts: Sequence[SketchedPart], sensors: Sequence[str], hits: Sequence[str]) -> Sketch | None:
-    """Draw both parts of an assembly, sensors and hits; None where places of nodes are not known.
+    """Draw the parts of an assembly and its joints, sensors and hits; None where places of nodes are not known.
 
     Parameters
     ----------
     parts : sequence of SketchedPart
-        The second is moved to where its nodes at the joint lie on those of the first.
+        All but the first are moved to where their nodes at joints lie on those of others.
     sensors, hits : sequence of str
         DOFs ``"A/7:y"``.
     """
     placed = moved_parts(parts)
     if placed is None:
         return None
-    moved, reference = placed
+    moved, joints = placed
+    levels = _levels(len(parts), joints)
     every = np.array([at for own in moved for at in own.values()])
     view = _view_along(int(np.argmax(np.ptp(every, axis=0))))
     flat = every @ view.T
@@ -348,34 +381,50 @@ def assembly_sketch(parts: Sequence[SketchedPart], sensors: Sequence[str], hits:
 
     def at(place: FloatArray, side: int) -> FloatArray:
         right, up = (place @ view.T - middle) * scale
-        return np.array([_WIDTH / 2 + right, height / 2 - up + (2 * side - 1) * _LIFT])
+        return np.array([_WIDTH / 2 + right, height / 2 - up + (2 * levels[side] - 1) * _LIFT])
 
     drawn: list[str] = []
+    styles = ["jk"[level % 2] for level in levels]
     for side, own in enumerate(moved):
         step = max(1, len(own) // _MOST_NODES)
         spots = (at(place, side) for place in list(own.values())[::step])
-        drawn += [f'<circle class="{"jk"[side]} node" cx="{x:.1f}" cy="{y:.1f}" r="1.6"/>' for x, y in spots]
+        drawn += [f'<circle class="{styles[side]} node" cx="{x:.1f}" cy="{y:.1f}" r="1.6"/>' for x, y in spots]
     letters = [part.letter for part in parts]
     names: dict[str, tuple[float, float]] = {}
-    taken = [_corner_box(height), _box(*_pair((at(reference, 0) + at(reference, 1)) / 2), 12.0)]
+    taken = [_corner_box(height)]
+    for name, ends in joints.items():
+        first, last = ([at(place, side) for side, place in ends.items()] * 2)[:2]
+        if len(ends) == 1:  # the ground
+            last = first + np.array([0.0, 2 * _LIFT])
+            drawn.append(f'<path class="joint open" d="M{last[0] - 7:.1f} {last[1]:.1f}h14"/>')
+        drawn.append(_spring(first, last))
+        spot = _pair((first + last) / 2)
+        taken.append(_box(*spot, 12.0))
+        names |= {name: spot} if name else {}
+    if len(parts) > 2:
+        for side, own in enumerate(moved):
+            names.setdefault(letters[side], _pair(at(np.mean(list(own.values()), axis=0), side)))
     for dofs, draw in ((hits, _hit), (sensors, _sensor)):
         for dof in dofs:
             letter, _, rest = dof.partition("/")
             node, _, direction = rest.rpartition(":")
             side = letters.index(letter)
             if node in moved[side]:
-                spot = at(moved[side][node], side)
+                spot_of = at(moved[side][node], side)
                 along = _on_page(direction, view)
-                drawn.append(draw("jk"[side], spot, along))
-                names[dof] = _pair(spot)
+                drawn.append(draw(styles[side], spot_of, along))
+                names[dof] = _pair(spot_of)
                 taken.append(_box(*names[dof], 7.0))
                 taken += _boxes_along(*names[dof], -along * _ARROW) if draw is _hit else []
     text, left_out = _names(names, taken, height)
-    drawn += [_spring(at(reference, 0), at(reference, 1)), _axes(height, view), text]
-    caption = (
-        f"Nodes of {letters[0]} and of {letters[1]} (drawn below it, where they meet); squares: sensors; arrows: hits; "
-        f"spring: the joint{left_out}"
-    )
+    drawn += [_axes(height, view), text]
+    named = [name for name in joints if name]
+    if len(parts) == 2:
+        nodes = f"{letters[0]} and of {letters[1]} (drawn below it, where they meet)"
+    else:
+        nodes = f"{', '.join(letters)}, where they meet (drawn apart)"
+    springs = f"springs: the joints {', '.join(named)}" if named else "spring: the joint"
+    caption = f"Nodes of {nodes}; squares: sensors; arrows: hits; {springs}{left_out}"
     words = f"Sensors at {', '.join(sensors)}; hits at {', '.join(hits)}."
     return Sketch("assembly", _as_svg(drawn, height), caption, f"Sketch of the assembly. {words}")
 

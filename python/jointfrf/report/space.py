@@ -41,7 +41,7 @@ def space_of_fit(fit: Fit, parts: Sequence[SketchedPart]) -> Space | None:
     fit : Fit
         With its data.
     parts : sequence of SketchedPart
-        Both parts of a fit of an assembly.
+        Both parts of a fit of an assembly; of more there is no view.
 
     Notes
     -----
@@ -65,11 +65,12 @@ def space_of_fit(fit: Fit, parts: Sequence[SketchedPart]) -> Space | None:
         def fitted(line: int) -> ComplexArray:
             return np.asarray(modes[0] @ data.regenerated(slice(line, line + 1))[0] @ modes[1].T)
 
-    elif isinstance(data, ModelData) and parts:
+    elif isinstance(data, ModelData) and len(parts) == 2:
         moved = moved_parts(parts)
         if moved is None:
             return None
-        places, reference = moved
+        places, joints = moved
+        reference = np.mean([next(iter(ends.values())) for ends in joints.values()], axis=0)
         centres, grid = np.array([reference, reference]), [np.array(list(own.values())) for own in places]
         points = _points_of_parts(fit.responses, [part.letter for part in parts], places)
         names, forces, measured, predicted = fit.responses, fit.forces, data.measured, data.predicted

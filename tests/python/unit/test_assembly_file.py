@@ -17,7 +17,7 @@ from jointfrf.errors import FileContentError
 from jointfrf.io import Channel, FrfSet, write_frfs
 from jointfrf.report.fit_model import is_wide
 from jointfrf.report.fit_page import ReportOptions, finding_sentences, fit_document
-from jointfrf.report.sketch import _view_along, assembly_sketch
+from jointfrf.report.sketch import SketchedPart, _view_along, assembly_sketch, moved_parts
 from jointfrf.toml.documents import schema_of
 
 FREQ = np.linspace(0.5, 10, 300)
@@ -465,6 +465,42 @@ def test_the_sketch_in_words_and_on_the_page(tmp_path, frfs):
     places = [float(x) for x in re.findall(r'<rect class="[jk]" x="([\d.]+)"', sketch.svg)]
     nodes = [float(x) for x in re.findall(r' node" cx="([\d.]+)"', sketch.svg)]
     assert places[0] < np.median(nodes) < places[1]
+
+
+def test_a_sketch_of_many_parts_has_all_joints_where_they_meet():
+    def part(name, joints):
+        """Return a bar of five nodes, 1 m."""
+        return SketchedPart(name, {str(i): np.array([i / 4, 0, 0]) for i in range(5)}, joints)
+
+    # A ring of three, each by its end on the middle of the next, and a mount on the ground.
+    parts = [
+        part("a", {"ab": ["4"], "ca": ["2"], "mount": ["0"]}), part("b", {"ab": ["2"], "bc": ["4"]}),
+        part("c", {"bc": ["0"], "ca": ["4"]}),
+    ]  # fmt: skip
+    moved, joints = moved_parts(parts)
+    np.testing.assert_allclose([own["0"][0] for own in moved], [0, 0.5, 0.5])  # the ring does not close
+    assert {name: list(ends) for name, ends in joints.items()} == {
+        "ab": [0, 1],
+        "ca": [0, 2],
+        "mount": [0],
+        "bc": [1, 2],
+    }
+    np.testing.assert_allclose([joints["bc"][side][0] for side in (1, 2)], [1.5, 0.5])
+    sketch = assembly_sketch(parts, ["c/1:y"], ["a/0:y"])
+    assert sketch.svg.count('class="joint open"') == 4 + 1
+    assert all(f">{name}<" in sketch.svg for name in ("ab", "bc", "ca", "mount", "a", "b", "c", "c/1:y", "a/0:y"))
+    assert "springs: the joints ab, ca, mount, bc" in sketch.caption
+    assert assembly_sketch([*parts, part("loose", {"other": ["0"]})], [], []) is None
+
+
+def test_the_sketch_of_a_case_of_many_parts():
+    case = Path(__file__).resolve().parents[3] / "cases/four-mounts"
+    measured = jf.measured_assembly(case / "assembly.toml", jf.io.read_frfs(case / "test.uff").receptance())
+    sketch = assembly_sketch(measured.sketched, measured.responses, measured.forces)
+    assert all(f">{name}<" in sketch.svg for name in (*measured.parts, "fl", "fr", "rl", "rr"))
+    assert [line.partition(" between")[0] for line in measured.describe()[:4]] == [
+        f"joint {n}" for n in ("fl", "fr", "rl", "rr")
+    ]
 
 
 @pytest.mark.parametrize("axis", range(3))

@@ -57,6 +57,30 @@ def test_errors_are_those_of_differences_of_the_frfs():
     assert found.proposed.cost == 0
 
 
+def test_common_means_are_targets():
+    """Of n joints that are known well the mean is known to spread / sqrt(n); of ones that are not, to more."""
+    body = jf.chain([5, 3, 4, 2], [2500, 3500, 3000], [3, 4, 1], ground="none")
+    values = {"fl": 1800.0, "fr": 2000.0, "rl": 2100.0, "rr": 2200.0}
+    dofs = [f"m/{i}:x" for i in range(1, 5)]
+
+    def planned(spread: float | None, noise: float = 1e-3) -> jf.MeasurementPlan:
+        joints = {
+            name: jf.PlacedJoint(jf.Joint([k], [3.0], ["x"]), [dof])
+            for (name, k), dof in zip(values.items(), dofs, strict=True)
+        }
+        alike = {"mounts": jf.Alike(list(values), spread)}
+        part = jf.Substructure(body, [dof.partition("/")[2] for dof in dofs], exact=True)
+        whole = jf.Assembly.of_parts({"m": part}, joints, alike=alike)
+        return jf.plan(whole, FREQ, dofs, dofs, noise=noise, targets=["mounts.k_x"], sensors=dofs, hits=dofs)
+
+    found = planned(0.1)
+    assert found.value["mounts.k_x"] == pytest.approx(np.exp(np.log(list(values.values())).mean()))
+    assert found.proposed.error == pytest.approx(0.1 / 2, rel=1e-4)
+    assert planned(0.1, noise=100.0).proposed.error > 0.1
+    with pytest.raises(ValueError, match=r"mounts\.k_x is the mean of joints whose spread is not known"):
+        planned(None)
+
+
 def test_fits_scatter_as_predicted():
     whole = chains()
     test = jf.plan(whole, FREQ, MASSES, MASSES, noise=0.05, budget=3).proposed
