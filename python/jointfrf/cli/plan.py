@@ -13,7 +13,7 @@ from jointfrf.assembly_file.keys import ReceptancesPart
 from jointfrf.assembly_file.measured import joint_words
 from jointfrf.assembly_file.read import AssemblyPart, check_dofs, named_dof, read_assembly_file
 from jointfrf.cases.catalogue import read_case_and_kind
-from jointfrf.cases.known_joint.exact import exact_frfs
+from jointfrf.cases.known_joint.exact import exact_frfs, frfs_by_differences
 from jointfrf.cases.known_joint.keys import KnownJointCase
 from jointfrf.cases.substructures import MeasuredStructure, ModelStructure
 from jointfrf.cli.frf import add_line_arguments, lines_of
@@ -65,6 +65,10 @@ def add_arguments(parser: CommandParser) -> None:
     parser.option(
         "--sensor-mass KG", "mass of each sensor that the models do not have: what it moves is shown", _positive
     )
+    parser.option(
+        "--spacings M,...",
+        "of a case.toml: what rotations by finite differences over these spacings move: 0.001,0.005", _spacings,
+    )  # fmt: skip
     parser.heading("what is wanted")
     parser.option("--targets NAME,...", "parameters to be found: k_y,c_y; all of the joint by default", _dofs)
     parser.option(
@@ -87,6 +91,10 @@ def _positive(word: str) -> float:
     if not 0 < found < float("inf"):
         raise argparse.ArgumentTypeError(f"must be a number above zero, not {word!r}")
     return found
+
+
+def _spacings(word: str) -> list[float]:
+    return [_positive(part) for part in word.split(",")]
 
 
 def _dofs(word: str) -> list[str]:
@@ -115,6 +123,7 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("--band LOW:HIGH and --step HZ are missing: the lines that will be measured")
     if args.model.is_dir() or args.model.name == _CASE:
         return _of_case(args, freq, out)
+    warn_of_ignored(args, ("--spacings",), "a test with models takes translations as they are")
     file = read_assembly_file(args.model)
     file.check_values()
     parts = file.parts(freq)
@@ -163,10 +172,13 @@ def _of_case(args: argparse.Namespace, freq: FloatArray, out: Output) -> int:
     case, _ = read_case_and_kind(args.model if args.model.is_dir() else args.model.parent)
     if not isinstance(case, KnownJointCase):
         raise FileContentError(f"{args.model}: a plan takes a case of two parts and a joint (kind known-joint)")
-    exact = exact_frfs(replace(case, freq_hz=freq))
+    case = replace(case, freq_hz=freq)
+    exact = exact_frfs(case)
+    biased = {f"{1e3 * spacing:g} mm": frfs_by_differences(case, spacing) for spacing in args.spacings or ()}
     found = plan_joint_frfs(
-        freq, exact.interface(exact.h_c), case.joint, noise=args.noise, floor=args.floor or 0.0, averages=args.averages
-    )
+        freq, exact.interface(exact.h_c), case.joint, noise=args.noise, floor=args.floor or 0.0,
+        averages=args.averages, biased=biased or None,
+    )  # fmt: skip
     written = [] if args.report is None else [write_plan(found, args.report, command=args.typed)]
     out.say(found, *([""] if written else []), *(f"wrote {path}" for path in written))
     out.give({"model": str(args.model), **asdict(found), "written": [str(path) for path in written]})

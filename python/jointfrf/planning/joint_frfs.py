@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,7 @@ from jointfrf.identification.information_bound import information_rows
 from jointfrf.identification.manifold.coordinates import DampingTerms
 from jointfrf.identification.result import columns_of
 from jointfrf.joint import Joint
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_square, check_type
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_square, check_type, one_line
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.planning.information import expected_noise, narrowest_band
 
@@ -41,6 +41,8 @@ class JointFrfPlan:
         Of each parameter, the narrowest band with 90 % of what the lines know of it, Hz.
     shift : dict of str to float
         By how much FRFs that are wrong in a known way move each parameter.
+    shifts : dict of str to dict of str to float
+        The same for each of several ways.
     """
 
     freq_hz: FloatArray
@@ -50,16 +52,22 @@ class JointFrfPlan:
     frf_share: FloatArray
     bands: dict[str, Band]
     shift: dict[str, float]
+    shifts: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def __str__(self) -> str:
         return "\n".join(self._lines())
 
+    def moved(self) -> dict[str, dict[str, float]]:
+        """Return the shifts by the headings of their columns."""
+        return ({"shift": self.shift} if self.shift else {}) | {f"shift, {way}": by for way, by in self.shifts.items()}
+
     def _lines(self) -> Iterator[str]:
-        rows = [("", "expected", "standard error", "band, Hz", "shift")[: 5 if self.shift else 4]]
+        moved = self.moved()
+        rows = [("", "expected", "standard error", "band, Hz", *moved)]
         for name, value in self.value.items():
             low, high = self.bands[name]
             row = (name, f"{value:.4g}", _relative(self.std_error[name], value), f"{low:.4g} to {high:.4g}")
-            rows.append((*row, _relative(self.shift[name], value)) if self.shift else row)
+            rows.append((*row, *(_relative(by[name], value) for by in moved.values())))
         yield from columns_of(rows)
 
 
@@ -75,7 +83,7 @@ def plan_joint_frfs(
     noise: float = 0.01,
     floor: float = 0.0,
     averages: float = 1.0,
-    biased: ArrayLike | None = None,
+    biased: ArrayLike | Mapping[str, ArrayLike] | None = None,
 ) -> JointFrfPlan:
     """Say what FRFs between all DOFs of a joint will know of it by `identify`, which lines and FRFs matter.
 
@@ -89,9 +97,9 @@ def plan_joint_frfs(
         As it is expected, without cross terms.
     noise, floor, averages : float
         As in `plan`.
-    biased : array_like, shape of gamma, optional
+    biased : array_like, shape of gamma, or mapping of str to array_like, optional
         FRFs as the test will give them without noise: rotations by finite differences at a spacing, virtual points on
-        sides that bend, sensors with their masses. What that moves is `shift`.
+        sides that bend, sensors with their masses. What that moves is `shift`; of several, by their names, `shifts`.
 
     Returns
     -------
@@ -141,6 +149,10 @@ def plan_joint_frfs(
         for kind in kinds
         for i, dof in enumerate(joint.dofs)
     }
+
+    def shift_by(what: str, wrong: ArrayLike) -> dict[str, float]:
+        return _shift(freq, as_square(what, wrong, freq.size), variance, joint, expected)
+
     rows = information_rows(freq, lines, variance, kinds)
     size = 1 / np.sqrt(2 * np.einsum("lfp,lfp->p", rows.conj(), rows).real)  # stiffness and damping differ by much
     rows = rows * size
@@ -159,7 +171,10 @@ def plan_joint_frfs(
         line_share,
         frf_share.reshape(-1, 2 * n, 2 * n),
         {name: narrowest_band(freq, share) for name, share in zip(expected, line_share, strict=True)},
-        {} if biased is None else _shift(freq, as_square("biased", biased, freq.size), variance, joint, expected),
+        shift_by("biased", biased) if biased is not None and not isinstance(biased, Mapping) else {},
+        {way: shift_by(f"biased {one_line(way)}", own) for way, own in biased.items()}
+        if isinstance(biased, Mapping)
+        else {},
     )
 
 

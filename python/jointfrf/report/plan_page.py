@@ -94,10 +94,11 @@ def write_plan(
 
 def _of_joint_frfs(plan: JointFrfPlan, command: str) -> Document:
     columns = ("parameter", "expected", "standard error", "error, %", "band from, Hz", "to, Hz")
-    shift = ("FRFs that are wrong move it by",) if plan.shift else ()
+    moved = plan.moved()
+    shift = tuple(heading.replace("shift", "FRFs that are wrong move it by") for heading in moved)
     rows = tuple(
         (name, value, plan.std_error[name], 100 * plan.std_error[name] / abs(value) if value else None,
-         *plan.bands[name], *([plan.shift[name]] if shift else []))
+         *plan.bands[name], *(by[name] for by in moved.values()))
         for name, value in plan.value.items()
     )  # fmt: skip
     terms = map(Parameter.parse, plan.value)

@@ -3,6 +3,7 @@
 import itertools
 import json
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -232,6 +233,25 @@ def test_wrong_frfs_at_the_joint_move_a_hysteretic_joint():
     assert list(found.value) == ["k_x", "h_x"]
     assert found.value["h_x"] == pytest.approx(200)
     assert_allclose(list(found.shift.values()), [2000 * (1 / 1.01 - 1), 200 * (1 / 1.01 - 1)], rtol=1e-3)
+    both = jf.plan_joint_frfs(FREQ, gamma, joint, noise=0.01, biased={"gain": gamma * 1.01, "none": gamma})
+    assert both.shifts["gain"] == found.shift
+    assert_allclose(list(both.shifts["none"].values()), 0, atol=1e-6)
+    assert str(both).splitlines()[0].endswith("shift, gain  shift, none")
+
+
+def test_differences_find_what_lies_between_their_points(capsys):
+    """Over s a beam gives way to a pair of forces by s/(3 E I) in bending and 1/(kappa G A s) in shear."""
+    case = str(Path(__file__).resolve().parents[3] / "cases/3.3-beams-1mm/case.toml")
+    words = ["plan", case, "--band", "10:300", "--step", "5"]
+    assert main([*words, "--spacings", "0.002,0.005", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert list(found["shifts"]) == ["2 mm", "5 mm"]
+    inertia, shear = 67e9 * 0.025 * 0.006**3 / 12, 5 / 6 * 67e9 / (2 * 1.33) * 0.025 * 0.006
+    for spacing, shift in zip((0.002, 0.005), found["shifts"].values(), strict=True):
+        softer = 1 / (1 / 5e3 + 2 * (spacing / (3 * inertia) + 1 / (shear * spacing)))
+        assert_allclose(5e3 + shift["k_Mtheta"], softer, rtol=0.1)
+    assert main([*words, "--spacings", "0.0005"]) == 1
+    assert "no node lies 0.0005 m beside 301 along x" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, cast
 
 import numpy as np
+import scipy.linalg
 
 from jointfrf.cases.keys import FITTED, Observed
 from jointfrf.cases.known_joint.keys import KnownJointCase
+from jointfrf.cases.structure import Structure
+from jointfrf.dofs import direction_names, is_rotation
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.call import OnSingular
@@ -21,6 +25,7 @@ __all__ = [
     "Exact",
     "NoiseFree",
     "exact_frfs",
+    "frfs_by_differences",
     "joint_lines",
     "measured",
     "needed_frfs",
@@ -91,6 +96,76 @@ def exact_frfs(case: KnownJointCase) -> Exact:
     h_initial = couple(h_a, h_b, initial, first, first, freq_hz=freq)
     h_c = couple(h_a, h_b, case.joint.dynamic_stiffness(freq), first, first, freq_hz=freq)
     return Exact(freq, case.joint.dofs, h_a, h_b, h_initial, h_c, initial)
+
+
+#: Translation whose slope along an axis of space is a rotation, and the sign of it.
+_SLOPES = {"theta_x": ("z", 1, 1.0), "theta_y": ("z", 0, -1.0), "theta_z": ("y", 0, 1.0)}
+#: A node stands for a place that is off by less than this share of the spacing.
+_NEAR = 0.05
+
+
+def frfs_by_differences(case: KnownJointCase, spacing: float) -> ComplexArray:
+    """Return FRFs of the assembly at the joint whose rotations are differences of translations over a spacing.
+
+    Central differences (2.57) where there are nodes on both sides, of one side at the end of a part.
+
+    Parameters
+    ----------
+    case : KnownJointCase
+    spacing : float
+        From the joint to its neighbours, m.
+
+    Returns
+    -------
+    ndarray, shape (n_freq, 2 n, 2 n)
+        DOFs j, then k.
+
+    Raises
+    ------
+    ValueError
+        No node at this distance.
+    """
+    freq, n = case.freq_hz, len(case.joint.dofs)
+    sides, h = [], []
+    for structure, point in ((case.a, "j"), (case.b, "k")):
+        dofs = list(case.points[point])
+        weights = _difference_weights(structure, dofs, spacing)
+        dofs += dict.fromkeys(dof for row in weights for dof in row if dof not in dofs)
+        sides.append(np.array([[row.get(dof, 0.0) for dof in dofs] for row in weights]))
+        h.append(structure.receptance(freq, dofs))
+    whole = couple(h[0], h[1], case.joint.dynamic_stiffness(freq), range(n), range(n), freq_hz=freq)
+    taken = scipy.linalg.block_diag(*sides)
+    found: ComplexArray = taken @ whole @ taken.T
+    return found
+
+
+def _difference_weights(structure: Structure, dofs: Sequence[str], spacing: float) -> list[dict[str, float]]:
+    """Return which DOFs each DOF is a sum of, and their weights."""
+    found = []
+    for dof in dofs:
+        node, _, direction = dof.rpartition(":")
+        if not is_rotation(direction):
+            found.append({dof: 1.0})
+            continue
+        along, axis, sign = _SLOPES["theta_z" if direction == "theta" else direction_names([direction])[0]]
+        places = structure.places
+        if node not in places:
+            raise ValueError(f"the place of node {node} is not known: no difference can stand for {dof}")
+        ends = {}
+        for way in (-1, 1):
+            wanted = places[node] + way * spacing * np.eye(3)[axis]
+            nearest = min(places, key=lambda one: float(np.linalg.norm(places[one] - wanted)))
+            if np.linalg.norm(places[nearest] - wanted) < _NEAR * spacing:
+                ends[nearest] = float(places[nearest][axis])
+        if not ends:
+            raise ValueError(
+                f"no node lies {spacing:g} m beside {node} along {'xyz'[axis]}: rotation {dof} has no difference"
+            )
+        if len(ends) == 1:
+            ends[node] = float(places[node][axis])
+        (first, x), (last, y) = ends.items()
+        found.append({f"{first}:{along}": sign / (x - y), f"{last}:{along}": sign / (y - x)})
+    return found
 
 
 #: Equal up to rounding, and without the model: (2.47) and its short form.
