@@ -9,6 +9,9 @@ from scipy.linalg import eigh
 import jointfrf as jf
 from deforming_blocks import ALUMINIUM, STIFFNESS, block, measured
 from jointfrf.dofs import DIRECTIONS
+from jointfrf.identification.manifold.prepare import FitOptions, prepare_compliance
+from jointfrf.identification.noise import NoiseOptions
+from jointfrf.identification.prepare import as_measured
 from jointfrf.identification.side_models import corrected_frfs
 
 SECTION = {"density": 2700.0, "width": 0.025, "height": 0.012, "loss_factor": 0.01}
@@ -160,6 +163,36 @@ def test_a_joint_between_beams_is_found_by_models_of_them(wrong):
         assert fit.value[f"k_{dof}"] == pytest.approx(k, rel=0.1)
     assert any("corrected by the models of the sides" in text for text in fit.notes)
     assert not fit.seen
+
+
+def test_noise_carried_by_models_has_the_covariance_that_is_used():
+    """Sensors at the impacts, more noise in h_pq than in h_qp: whitened entries have mean square 1 on each line."""
+    h = whole(JOINT, SENSORS, SENSORS)
+    more = np.where(np.tri(h.shape[1], dtype=bool), 1.0, 0.3)
+    variance = (1e-4 * more * abs(h)) ** 2
+    point = jf.virtual_interface(*(points(side, SENSORS[side]) for side in (0, 1)))
+    sides = tuple(
+        jf.SideModel(
+            jf.Substructure(model, at(side), {name: jf.Unknown(1.0, 1e-9) for name in ("youngs_modulus", "density")}),
+            [f"{i}:y" for i in SENSORS[side]], modes=0.0,
+        )
+        for side, model in enumerate(beams())
+    )  # fmt: skip
+    squares = []
+    for seed in range(8):
+        real, imaginary = np.random.default_rng(seed).standard_normal((2, *h.shape))
+        noisy = h + np.sqrt(variance / 2) * (real + 1j * imaginary)
+        problem = prepare_compliance(
+            as_measured(FREQ, noisy, square=False), DOFS, None, point, NoiseOptions(variance),
+            FitOptions("viscous", "zero", True), sides,
+        )  # fmt: skip
+        lines = problem.frfs.of_dofs(np.arange(2))
+        true = problem.frfs.entries_of(np.arange(2), corrected_frfs(
+            FREQ, h, h, variance, (point.transform, point.transform), (point.modes, point.modes), sides
+        ).smooth_gamma)  # fmt: skip
+        residual = (lines.measured - true) * lines.inverse_std
+        squares.append((abs(np.einsum("lij,lj->li", lines.correlation, residual)) ** 2).mean(axis=1))
+    np.testing.assert_allclose(np.mean(squares, axis=0), 1, atol=5 / np.sqrt(8 * 10))
 
 
 def block_models(softer=1.0):

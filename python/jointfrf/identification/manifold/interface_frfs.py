@@ -148,7 +148,10 @@ class InterfaceFrfs(NamedTuple):
         t_r, t_f = self.responses[at], self.forces[at]
         entries = FrfEntries.of(len(dofs), reciprocal=self.reciprocal)
         share = None
-        if self.reciprocal and not self.symmetrised and np.array_equal(self.responses, self.forces):
+        # Shares by channel do not commute with models of the sides, which carry noise between channels: those of h_pq
+        # and h_qp are then a half.
+        is_square = np.array_equal(self.responses, self.forces)
+        if self.reciprocal and not self.symmetrised and is_square and self.noise_paths is None:
             share = direction_share(self.variance)
 
         def of_lines(own: slice) -> list[NDArray[Any]]:
