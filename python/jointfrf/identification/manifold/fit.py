@@ -438,7 +438,10 @@ def _averaged(found: JointEstimate, dofs: tuple[str, ...], choices: tuple[DofDam
             mean = share @ [values for values, _ in parts]
             spread = sum(w * (own + np.outer(at - mean, at - mean)) for w, (at, own) in zip(share, parts, strict=True))
             theta[group.which] += mean - base[0]
-            covariance[np.ix_(group.which, group.which)] += spread - base[1]
+            own_part = np.ix_(group.which, group.which)
+            whole = covariance[own_part] + spread - base[1]
+            # What two lines hardly determine has no derivatives that agree far from the minimum.
+            covariance[own_part] = whole if (np.diagonal(whole) > 0).all() else spread
             kinds_of_groups[-1] += minima
     return found._replace(theta=theta, covariance=covariance, kinds=tuple(map(tuple, kinds_of_groups)))
 
