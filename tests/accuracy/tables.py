@@ -1,8 +1,9 @@
 """Writes what a study prints into the page that shows it: `tests/accuracy/run --write STUDY [OPTION...]`.
 
-A page has the command of its table before it, `<!-- table: pools --draws 500 -->`, or `<!-- table 2 of: plans -->` for
-the second that is printed, and `<!-- /table -->` after it. Tables of several commands, or beside those of an older
-version, have none: they were put together.
+A study is one of `tests/accuracy/run`, or `run-NAME` of `tests/benchmarks`. A page has the command of its table before
+it, `<!-- table: pools --draws 500 -->`, or `<!-- table 2 of: plans -->` for the second that is printed, and
+`<!-- /table -->` after it. Tables of several commands, or beside those of an older version, have none: they were put
+together.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 HERE = Path(__file__).resolve().parent
-PAGES = tuple(HERE.parents[1] / "docs" / name for name in ("accuracy.md", "checks.md"))
+PAGES = tuple(HERE.parents[1] / "docs" / name for name in ("accuracy.md", "checks.md", "performance.md"))
 _MARKED = re.compile(r"<!-- table(?: (\d+) of)?: (.+?) -->\n(.*?)\n<!-- /table -->", re.DOTALL)
 
 
@@ -55,12 +56,14 @@ def main() -> None:
     if words not in known:
         raise SystemExit(f"no table is of {words!r}; tables are of:\n  " + "\n  ".join(known))
     lines = []
-    with subprocess.Popen([HERE / "run", *sys.argv[1:]], stdout=subprocess.PIPE, text=True) as study:
-        for line in study.stdout or ():
+    study, *options = sys.argv[1:]
+    command = [HERE.parent / "benchmarks" / study] if study.startswith("run-") else [HERE / "run", study]
+    with subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True) as running:
+        for line in running.stdout or ():
             print(line, end="", flush=True)
             lines.append(line)
-    if study.returncode:
-        raise SystemExit(study.returncode)
+    if running.returncode:
+        raise SystemExit(running.returncode)
     for path in PAGES:
         text = path.read_text(encoding="utf-8")
         path.write_text(written(text, words, tables_printed("".join(lines))), encoding="utf-8")

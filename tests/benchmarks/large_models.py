@@ -37,19 +37,19 @@ def main() -> int:
     if options.way is not None:
         print(json.dumps(_measured(options.way, options.divisions, options.lines)))
         return 0
-    print(f"{options.lines} lines, 6 x 6 FRFs, one thread")
-    print(f"{'library':20} {'DOFs':>8} {'seconds':>9} {'CPU':>9} {'GiB':>6} {'error':>9}")
+    print(f"{options.lines} lines, 6 x 6 FRFs, one thread\n")
+    print("| sparse factors by | DOFs | CPU s | peak memory, GiB | error estimate |\n|---|---|---|---|---|")
     threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     for way in _WITHOUT:
         given = ["--way", way, "--lines", str(options.lines), "--divisions", ",".join(map(str, options.divisions))]
         command = [sys.executable, "-m", "benchmarks.large_models", *given]
         done = subprocess.run(command, env=os.environ | threads, capture_output=True, text=True, check=False)
         if done.returncode:
-            print(f"{way:20} {(done.stderr.strip().splitlines() or ['failed'])[-1]}")
+            print(f"{way}: {(done.stderr.strip().splitlines() or ['failed'])[-1]}", file=sys.stderr)
             continue
         r = json.loads(done.stdout)
-        figures = f"{r['dofs']:8d} {r['seconds']:9.1f} {r['cpu']:9.1f} {r['gib']:6.2f} {r['error']:9.1e}"
-        print(f"{way:20} {figures}  {r['solver']}")
+        figures = f"{r['dofs']} | {r['cpu']:.0f} | {r['gib']:.1f} | {r['error']:.1e}"
+        print(f"| {way} ({r['solver']}) | {figures} |", flush=True)
     return 0
 
 

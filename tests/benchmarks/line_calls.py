@@ -17,7 +17,9 @@ from .machine import ROOT, build_kernel
 from .options import numbers
 
 _SOURCE = ROOT / "tests" / "benchmarks" / "line_calls.F90"
-_WAYS = {"work": "jf_NAME_work", "line": "jf_NAME", "sweep": "all lines"}
+_ROUTINES = {"couple": "jf_couple", "compliance": "jf_joint_compliance", "solve": "jf_solve"}
+#: What a row counts, and how many times the joint DOFs that is: as many right-hand sides as the order.
+_COUNTED = {"couple": ("joint DOFs", 1), "compliance": ("joint DOFs", 1), "solve": ("order", 2)}
 
 
 def main() -> int:
@@ -30,12 +32,16 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         program = _compile(Path(folder) / "line_calls")
         records = [_run(program, order) for order in options.orders]
-    print(f"nanoseconds a line, one thread   {'  '.join(f'{way:>12}' for way in _WAYS.values())}         zgesv")
-    for name in ("couple", "compliance", "solve"):
+    print("Nanoseconds a line, one thread.")
+    for name, routine in _ROUTINES.items():
+        lapack = " | `zgesv`" if name == "solve" else ""
+        counted, times_dofs = _COUNTED[name]
+        ways = f"`{routine}_work` | `{routine}`, one line | `{routine}`, 1000 lines{lapack}"
+        print(f"\n| {counted} | {ways} |\n|---|---|---|---|{'---|' if lapack else ''}")
         for record in records:
-            times = "  ".join(f"{record[f'{name}_{way}']:12.0f}" for way in _WAYS)
-            zgesv = f"{record['solve_zgesv']:12.0f}" if name == "solve" else ""
-            print(f"{name:12} joint of {record['order']:2.0f} DOFs        {times}  {zgesv}")
+            times = [record[f"{name}_{way}"] for way in ("work", "line", "sweep")]
+            times += [record["solve_zgesv"]] if lapack else []
+            print(f"| {times_dofs * record['order']:.0f} | {' | '.join(f'{one:.0f}' for one in times)} |")
     if options.output is not None:
         options.output.write_text(json.dumps(records, indent=1) + "\n")
     return 0

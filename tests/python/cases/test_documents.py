@@ -104,7 +104,7 @@ def cells_printed(path):
                     yield re.escape(cell.strip()).replace("\0", r"[^\s|]+(?: [^\s|]+)?")
 
 
-@pytest.mark.parametrize("name", ["docs/accuracy.md", "docs/checks.md"])
+@pytest.mark.parametrize("name", ["docs/accuracy.md", "docs/checks.md", "docs/performance.md"])
 def test_tables_of_studies_have_the_heads_that_these_print(name):
     page, folder = DOCUMENTS[name], ROOT / "tests" / "accuracy"
     found = list(marked(page))
@@ -113,7 +113,11 @@ def test_tables_of_studies_have_the_heads_that_these_print(name):
     for one in found:
         study = one.words.split()[0]
         module = folder / f"{study.replace('-', '_')}.py"
-        if module.exists():
+        if study.startswith("run-"):
+            benchmarks = ROOT / "tests" / "benchmarks"
+            module = benchmarks / f"{study.removeprefix('run-').replace('-', '_')}.py"
+            assert f"-m benchmarks.{module.stem} " in (benchmarks / study).read_text(encoding="utf-8")
+        elif module.exists():
             assert re.search(rf"^{re.escape(study)}\)|[ |]{re.escape(study)}[ )]", known, re.MULTILINE), study
         else:  # a part of the study of the compliance fit
             assert f'"{study}": ' in (folder / "trials.py").read_text(encoding="utf-8")

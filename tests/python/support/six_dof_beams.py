@@ -11,6 +11,17 @@ LENGTH, WIDTH, THICKNESS = 0.3, 0.025, 0.006
 DOFS = ("x", "theta_y", "y", "theta_x", "z", "theta_z")
 JOINT = jf.Joint([1e6, 1e4, 1e6, 1e3, 1e7, 1e3], [10, 10, 30, 5, 20, 5], DOFS)
 FREQ = np.arange(1.0, 601.0)
+
+
+def _full(diagonal, seed):
+    """Full symmetric positive definite matrix with this diagonal."""
+    mixed = np.random.default_rng(seed).standard_normal((6, 24))
+    whole = mixed @ mixed.T
+    return whole * np.sqrt(np.outer(diagonal, diagonal) / np.outer(whole.diagonal(), whole.diagonal()))
+
+
+#: All 21 stiffnesses and 21 dampings.
+FULL = jf.Joint(_full(JOINT.stiffness.diagonal(), 1), _full(JOINT.damping.diagonal(), 2), DOFS)
 #: By symmetry the FRFs between these vanish: x, theta_y, theta_z and y, theta_x, z.
 GROUPS = ((0, 1, 5), (2, 3, 4))
 
