@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import jointfrf as jf
-from six_dof_beams import DOFS, FREQ, JOINT, assembly
+from six_dof_beams import FREQ, FULL, JOINT, assembly
 
 __all__ = ["NOISES", "SIZES", "TRIALS", "System", "Trial", "running_mean", "system"]
 
@@ -68,15 +68,8 @@ def _six(_: float, kind: str) -> System:
 
 
 def _full(_: float, kind: str) -> System:
-    def whole(diagonal: np.ndarray, seed: int) -> np.ndarray:
-        mixed = np.random.default_rng(seed).standard_normal((6, 24))
-        product = mixed @ mixed.T
-        size = np.sqrt(np.outer(diagonal, diagonal) / np.outer(product.diagonal(), product.diagonal()))
-        return product * size
-
-    joint = jf.Joint(whole(JOINT.stiffness.diagonal(), 1), whole(JOINT.damping.diagonal(), 2), DOFS)
     freq = FREQ[::2]
-    return System(freq, assembly(joint, freq), joint)
+    return System(freq, assembly(FULL, freq), FULL)
 
 
 @cache

@@ -145,18 +145,18 @@ def main() -> None:
     ten = sample(10, 2)
     forms = {
         "jointfrf": lambda: jf.couple_bodies(ten.freq, ten.bodies, ten.links),
-        "numpy, one matrix": numpy_dense(ten),
-        "numpy, body by body": numpy_blocks(ten),
+        "numpy, one block-diagonal matrix": numpy_dense(ten),
+        "numpy, products body by body": numpy_blocks(ten),
     }
     results = {name: form() for name, form in forms.items()}
     for name, own in results.items():
         assert np.allclose(own, results["jointfrf"], rtol=0, atol=1e-10 * abs(own).max()), name
     times = least(forms, rounds, clock)
     print("10 bodies of 20 DOFs, 12 connections of 6 DOFs, all 200 x 200 FRFs\n")
-    print("| form | us a line | times jointfrf |\n|---|---|---|")
+    print("| form | µs a line | times jointfrf |\n|---|---|---|")
     for name, own in times.items():
         print(f"| {name} | {own:.0f} | {own / times['jointfrf']:.1f} |")
-    print("\n| bodies | connections | all FRFs, us a line | 6 x 6 FRFs, us a line |\n|---|---|---|---|")
+    print("\n| bodies | connections | all FRFs, µs a line | 6 x 6 FRFs, µs a line |\n|---|---|---|---|")
     for count in (2, 5, 10, 20, 40):
         one = sample(count, 0)
         some = [f"b0/{k}" for k in range(6)]

@@ -34,13 +34,13 @@ def main() -> int:
         records = [_run(program, order) for order in options.orders]
     print("Nanoseconds a line, one thread.")
     for name, routine in _ROUTINES.items():
-        lapack = " | `zgesv`" if name == "solve" else ""
         counted, times_dofs = _COUNTED[name]
-        ways = f"`{routine}_work` | `{routine}`, one line | `{routine}`, 1000 lines{lapack}"
-        print(f"\n| {counted} | {ways} |\n|---|---|---|---|{'---|' if lapack else ''}")
+        heads = [counted, f"`{routine}_work`", f"`{routine}`, one line", f"`{routine}`, 1000 lines"]
+        heads += ["`zgesv`"] if name == "solve" else []
+        print(f"\n| {' | '.join(heads)} |\n{'|---' * len(heads)}|")
         for record in records:
             times = [record[f"{name}_{way}"] for way in ("work", "line", "sweep")]
-            times += [record["solve_zgesv"]] if lapack else []
+            times += [record["solve_zgesv"]] if name == "solve" else []
             print(f"| {times_dofs * record['order']:.0f} | {' | '.join(f'{one:.0f}' for one in times)} |")
     if options.output is not None:
         options.output.write_text(json.dumps(records, indent=1) + "\n")
