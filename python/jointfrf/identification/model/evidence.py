@@ -99,7 +99,7 @@ class _Levels:
 
 
 def with_model_error(
-    likelihood: Likelihood, minimum: Minimum, *, is_sought: bool = True
+    likelihood: Likelihood, minimum: Minimum, *, is_sought: bool = True, at_most: float = np.inf
 ) -> tuple[Likelihood, Minimum, ModelError] | None:
     """Fit with errors of the models as the FRFs show them, and as are believed; None where there are none.
 
@@ -110,6 +110,8 @@ def with_model_error(
         Without errors of the models.
     is_sought : bool
         Whether errors that the FRFs show are allowed for where they are not believed.
+    at_most : float
+        Level above which no fit is made: None where the squares about the minimum show a larger one.
 
     Notes
     -----
@@ -143,7 +145,7 @@ def with_model_error(
         if not is_sought or (turn and error.level == _LEVELS[-1]):
             error = error._replace(level=0.0)
         found = _deviations(prediction, error)
-        if not found.any():
+        if not found.any() or (turn == 0 and error.level > at_most):
             return None
         ratio = np.maximum(found, _LEVELS[0] * weight) / deviation
         x[n:] /= ratio

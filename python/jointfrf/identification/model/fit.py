@@ -239,7 +239,7 @@ def _values_of_equal(problem: ModelProblem) -> Iterator[FloatArray]:
 
 def _is_explained(problem: ModelProblem, minimum: Minimum) -> bool:
     """Whether small errors of the models explain what the residual has beside the noise: no other start is needed."""
-    found = with_model_error(problem.likelihood, minimum)
+    found = with_model_error(problem.likelihood, minimum, at_most=_SMALL_ERROR)
     return found is not None and found[2].level < _SMALL_ERROR and _ratio(*found[:2], problem.noise.inflation) < _GOOD
 
 
