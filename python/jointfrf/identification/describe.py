@@ -784,9 +784,9 @@ def _calibration(errors: CalibrationErrors | None) -> list[Finding]:
     )
     if errors.resonant:
         text += (
-            f"; gains differ by the square of frequency, as where some sensors, or how they are mounted, resonate at "
-            f"about {errors.resonance():.2g} Hz: all FRFs may then be too large by that, which intervals allow for "
-            f"where sensors differ, and no FRF shows where all resonate alike"
+            "; gains differ by the square of frequency, as where some sensors, or how they are mounted, resonate at "
+            f"about {float(f'{errors.resonance():.2g}'):.6g} Hz: all FRFs may then be too large by that, which "
+            "intervals allow for where sensors differ, and no FRF shows where all resonate alike"
         )
     return [*found, note("calibration", text)]
 
