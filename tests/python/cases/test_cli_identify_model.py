@@ -303,3 +303,20 @@ def test_pages_of_cases_with_several_joints_show_what_is_found_beside_the_truth(
         sets = [words[i + 1] for i, word in enumerate(words) if word == "MPC*"]
         assert words[words.index("MPCADD") + 2 :] == sets
         assert len(sets) == text.count("\nCBUSH ") == 16
+
+
+@pytest.mark.filterwarnings("ignore:.*poorly determined:jointfrf.errors.IdentificationWarning")
+def test_what_rational_functions_miss_of_close_modes_is_no_correlated_noise():
+    folder = CASES / "four-mounts"
+    own = runpy.run_path(str(folder / "make.py"))
+    frfs = own["measured"](0)
+    alone = jf.estimate_noise(frfs.freq_hz, frfs.receptance().h)
+    assert alone.inflation > 4  # each line has noise of its own
+    fit = jf.measured_assembly(folder / "assembly.toml", frfs).fit()
+    assert not any("neighbouring lines is correlated" in note for note in fit.notes)
+    off = [
+        (fit.value[name] - k) / fit.std_error[name]
+        for mount, ks in own["mounts"](0).items()
+        for name, k in zip((f"{mount}.k_x", f"{mount}.k_y"), ks[:2], strict=True)
+    ]
+    assert 0.6 < np.sqrt(np.mean(np.square(off))) < 1.7

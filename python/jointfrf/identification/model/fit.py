@@ -15,6 +15,7 @@ from scipy.sparse import csgraph
 
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.noise_model import NoiseModel
+from jointfrf.frf.noise_parts import line_correlation
 from jointfrf.frf.smoothing import pieces
 from jointfrf.identification.calibration import CalibrationSpread, student_factor
 from jointfrf.identification.line_starts import LineCompliance, from_lines, interface_compliance
@@ -57,6 +58,8 @@ _REFINED = 3
 #: Of a value that is known to this many times the one it began with, and this many units, at best, FRFs say nothing:
 #: the rest is rounding.
 _BLIND = 1e9
+#: The parameters of a fit have not taken up more of the noise than this.
+_MOST_TAKEN = 0.9
 #: -2 log likelihood of two points that differ by less is the same.
 _SAME = 1e-3
 
@@ -287,7 +290,15 @@ def _with_noise_of_model(problem: ModelProblem, minimum: Minimum) -> ModelProble
     tested = problem.variance * share
     in_pieces = len(pieces(np.argsort(problem.freq_hz))) > 1
     variance = tested if in_pieces else _about(problem, noise, predicted)
-    return replace(problem, variance=variance, tested=tested, smooth=predicted)
+    found = replace(problem, variance=variance, tested=tested, smooth=predicted)
+    if in_pieces or noise.inflation_source != "residual":
+        return found
+    # What a rational function has missed of peaks is alike on neighbouring lines, and no noise.
+    rest = ((problem.measured - predicted) / np.sqrt(variance))[:, np.isfinite(variance).all(axis=0)].T
+    used = np.where(noise.line_factor > 1, np.nan, rest)
+    taken = min(minimum.x.size / max(2 * used.size, 1), _MOST_TAKEN)
+    inflation = min(problem.noise.inflation, line_correlation(used, taken))
+    return replace(found, noise=replace(problem.noise, inflation=inflation))
 
 
 def _about(problem: ModelProblem, noise: NoiseModel, predicted: ComplexArray) -> FloatArray:

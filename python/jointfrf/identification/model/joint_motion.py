@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jointfrf.identification.minimise import minimise
-from jointfrf.identification.model.fit import FoundModel, fit_assembly
+from jointfrf.identification.model.fit import FoundModel, ModelProblem, fit_assembly
 from jointfrf.identification.model.next_channels import without_start
 from jointfrf.identification.model.uncertainty import ModelGradient
 from jointfrf.identification.parameters import ParameterVector, joint_vector
@@ -54,10 +54,22 @@ class FoundMotion:
     def __init__(self, found: FoundModel, describe: Callable[[FoundModel], Any]) -> None:
         self._found, self._describe = without_start(found), describe
 
+    @staticmethod
+    def _as_found(problem: ModelProblem) -> ModelProblem:
+        """Return a problem with the correlation of lines that was found without models, which stays so.
+
+        A law of the amplitude misses a joint by as much as rational functions miss its FRFs.
+        """
+        model = problem.noise.model
+        if model is None:
+            return problem
+        model = replace(model, inflation_source="none")
+        return replace(problem, noise=replace(problem.noise, inflation=model.inflation, model=model))
+
     def refitted(self, joint: LawJoint) -> Any:
         """Return the fit with another joint, all else starting from what was found; fixed parameters stay fixed."""
         found = self._found
-        problem, vector = found.problem, found.problem.vector
+        problem, vector = self._as_found(found.problem), found.problem.vector
         fixed = [one.name for one in vector.all if one.origin == "joint" and not one.is_free]
         prediction = copy(problem.prediction)
         prediction.whole = prediction.whole.with_joint(joint)
@@ -69,7 +81,7 @@ class FoundMotion:
 
     def __call__(self) -> JointMotion:
         """Return it at the parameters found, without errors of the models: they can look like a joint that changes."""
-        found, problem = self._found, self._found.problem
+        found, problem = self._found, self._as_found(self._found.problem)
         likelihood, minimum = problem.likelihood, found.minimum
         vector, prediction = likelihood.vector, likelihood.prediction
         if found.error is not None:
