@@ -142,11 +142,15 @@ def test_tables_of_studies_have_the_heads_that_these_print(name):
 @pytest.mark.long
 def test_the_page_on_planning_prints_what_it_shows(capsys, monkeypatch, tmp_path):
     page = DOCUMENTS["docs/planning.md"]
-    command, *shown = blocks("text", page)
-    words, expected = command.removeprefix("$ jointfrf ").split("\n", 1)
+    commands, shown = [], []
+    for text in blocks("text", page):
+        (commands if text.startswith("$") else shown).append(text)
     monkeypatch.chdir(ROOT)
-    assert main(words.split()) == 0
-    agree(capsys.readouterr().out, expected)
+    assert len(commands) == 2
+    for command in commands:
+        words, expected = command.removeprefix("$ jointfrf ").split("\n", 1)
+        assert main(words.split()) == 0
+        agree(capsys.readouterr().out, expected)
     monkeypatch.chdir(tmp_path)
     for example, text in zip(blocks("python", page), shown, strict=True):
         exec(example, {})
