@@ -14,7 +14,7 @@ sys.meta_path[:] = list({repr(finder): finder for finder in sys.meta_path[::-1]}
 from site_pages import escape_docstring, write_pages  # noqa: E402
 
 project = "jointfrf"
-author = "the jointfrf authors"
+author = "the jointfrf developers"
 copyright = author
 version = release = re.search(r"version: '([^']+)'", (ROOT / "meson.build").read_text(encoding="utf-8"))[1]
 
