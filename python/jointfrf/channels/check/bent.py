@@ -23,8 +23,9 @@ _RISE, _SHARE = 3.0, 1 / 8
 #: Peaks and responses that are looked at for each force, the largest ones: more hardly add to what one mode shows.
 #: Fewer responses cannot agree.
 _PEAKS, _RESPONSES, _LEAST = 10, 8, 3
-#: Steps of the search for the pole, and relative change at which it is found.
-_STEPS, _FOUND = 15, 1e-6
+#: Steps of the search for the pole, and change, in halves of the band, at which it is found: of third order in what is
+#: left, after the further powers.
+_STEPS, _FOUND = 15, 1e-4
 #: Chance, divided by the number of peaks, and shift in half bandwidths from which a resonance is called bent: less
 #: hardly changes the FRF, other modes that the powers do not quite describe reach 0.1, and 2 % of noise of the force
 #: that goes on over five lines 0.7.
@@ -113,19 +114,19 @@ def bent_findings(m: Measurement, rows: set[int], columns: set[int]) -> Iterator
 def _peaks(freq_hz: FloatArray, h: ComplexArray) -> Iterator[tuple[list[int], _Peak]]:
     """Yield line, first and last line of each peak of the FRFs of a force, shape (n_freq, n), and what is found."""
     usual = np.median(abs(h), axis=0)
-    h = h[:, usual > 0]
+    h, usual = h[:, usual > 0], usual[usual > 0]
     if h.shape[1] < _LEAST:
         return
-    size = np.sqrt(np.mean((abs(h) / usual[usual > 0]) ** 2, axis=1))
+    above = abs(h) / usual
+    size = np.sqrt(np.mean(above**2, axis=1))
     inner = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
     for line in inner[np.argsort(-size[inner])][:_PEAKS].tolist():
         first, last = _reach(size[line::-1]), _reach(size[line:])
         own = slice(line - first, line + last + 1)
         if min(first, last) < 2 or first + last + 1 < 2 * _TOGETHER + _POWERS + _FEWEST:
             continue
-        there = h[own]
-        largest = np.argsort(-abs(there).max(axis=0) / np.maximum(np.median(abs(h), axis=0), TINY))[:_RESPONSES]
-        peak = _look(freq_hz[own], there[:, largest])
+        largest = np.argsort(-above[own].max(axis=0))[:_RESPONSES]
+        peak = _look(freq_hz[own], h[own, largest])
         if peak is not None:
             yield [line, own.start, own.stop - 1], peak
 
@@ -190,7 +191,11 @@ def _moved(
     correlation = float(np.vdot(rest[:-1], rest[1:]).real) / squares
     wider = max((1 + correlation) / max(1 - correlation, TINY), 1.0)
     degrees = max((h.shape[1] * (len(x) - q.shape[1]) - 1) / wider, 1.0)
+    span = float(-log.min())
+    peak = _Peak(1.0, slope * span, slope * span / poles[0].imag, span)
     chances = [_tail(abs(slope) ** 2 * information / squares * degrees, degrees)]
+    if chances[0] >= _CHANCE:
+        return peak._replace(chance=chances[0]), left  # the others can only raise it
     known = np.maximum(1 - np.sum(abs(q) ** 2, axis=1), 1 / len(x))[:, None]
     scatter = max(float(np.sum(abs(g * rest / known) ** 2)), TINY)
     chances.append(_tail(abs(slope * information) ** 2 / scatter / wider, degrees))
@@ -198,8 +203,7 @@ def _moved(
     chances.append(_of_lines(left @ residues[0].conj() / size, log, x - poles[0], q))
     scatter = max(float(np.sum(abs(np.sum(g.conj() * rest, axis=0)) ** 2)), TINY)
     agree = _tail(abs(slope * information) ** 2 / scatter, h.shape[1] - 1)
-    span = float(-log.min())
-    return _Peak(max(chances) if agree < _AGREE else 1.0, slope * span, slope * span / poles[0].imag, span), left
+    return (peak._replace(chance=max(chances)) if agree < _AGREE else peak), left
 
 
 def _of_lines(left: ComplexArray, log: FloatArray, from_pole: ComplexArray, q: ComplexArray) -> float:
@@ -225,16 +229,19 @@ def _poles(x: FloatArray, h: ComplexArray, poles: ComplexArray) -> tuple[Complex
     """Return poles that all FRFs share, beside a parabola of each, and residues (n_poles, n), by Gauss and Newton."""
     n = len(poles)
     residues: ComplexArray = np.zeros((n, h.shape[1]), np.complex128)
+    parabola: FloatArray = np.linalg.qr(x[:, None] ** np.arange(3))[0]
+    h = h - parabola @ (parabola.T @ h)
     for _ in range(_STEPS):
-        own = np.stack([*(1 / (x - z) for z in poles), *(x**k + 0j for k in range(3))], axis=1)
-        q, r = np.linalg.qr(own)
+        near = 1 / (x[:, None] - poles)
+        q, r = np.linalg.qr(near - parabola @ (parabola.T @ near))
         if not abs(np.diagonal(r)).min() > TINY:
             return None
         inside = q.conj().T @ h
-        residues = np.asarray(np.linalg.solve(r, inside)[:n], np.complex128)
-        slopes = residues[:, None, :] / (x[None, :, None] - poles[:, None, None]) ** 2
-        own_slopes = (slopes - q @ (q.conj().T @ slopes)).reshape(n, -1)
-        step = np.linalg.lstsq(own_slopes.T, (h - q @ inside).ravel(), rcond=1e-10)[0]
+        residues = np.asarray(np.linalg.solve(r, inside), np.complex128)
+        slopes = (near.T**2)[:, :, None] * residues[:, None]
+        slopes -= parabola @ (parabola.T @ slopes)
+        slopes -= q @ (q.conj().T @ slopes)
+        step = np.linalg.lstsq(slopes.reshape(n, -1).T, (h - q @ inside).ravel(), rcond=1e-10)[0]
         step *= min(1.0, 0.5 * float(np.min(poles.imag / np.maximum(abs(step), TINY))))
         poles = poles + step
         if abs(step).max() < _FOUND:
