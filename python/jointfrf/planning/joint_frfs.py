@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,10 +39,9 @@ class JointFrfPlan:
         The same of each FRF, joint DOFs j, then k: 1 % more averages of an FRF lower the variance by a hundredth of it.
     bands : dict of str to tuple of float
         Of each parameter, the narrowest band with 90 % of what the lines know of it, Hz.
-    shift : dict of str to float
-        By how much FRFs that are wrong in a known way move each parameter.
     shifts : dict of str to dict of str to float
-        The same for each of several ways.
+        By how much FRFs that are wrong in a known way move each parameter, for each of the ways by its name; one that
+        has none is "".
     """
 
     freq_hz: FloatArray
@@ -51,15 +50,19 @@ class JointFrfPlan:
     line_share: FloatArray
     frf_share: FloatArray
     bands: dict[str, Band]
-    shift: dict[str, float]
-    shifts: dict[str, dict[str, float]] = field(default_factory=dict)
+    shifts: dict[str, dict[str, float]]
+
+    @property
+    def shift(self) -> dict[str, float]:
+        """What FRFs that are wrong in a way without a name move; empty where there are none."""
+        return self.shifts.get("", {})
 
     def __str__(self) -> str:
         return "\n".join(self._lines())
 
     def moved(self) -> dict[str, dict[str, float]]:
         """Return the shifts by the headings of their columns."""
-        return ({"shift": self.shift} if self.shift else {}) | {f"shift, {way}": by for way, by in self.shifts.items()}
+        return {f"shift, {way}" if way else "shift": by for way, by in self.shifts.items()}
 
     def _lines(self) -> Iterator[str]:
         moved = self.moved()
@@ -99,7 +102,7 @@ def plan_joint_frfs(
         As in `plan`.
     biased : array_like, shape of gamma, or mapping of str to array_like, optional
         FRFs as the test will give them without noise: rotations by finite differences at a spacing, virtual points on
-        sides that bend, sensors with their masses. What that moves is `shift`; of several, by their names, `shifts`.
+        sides that bend, sensors with their masses. What that moves is `shift`; of several, by name, it is in `shifts`.
 
     Returns
     -------
@@ -150,9 +153,9 @@ def plan_joint_frfs(
         for i, dof in enumerate(joint.dofs)
     }
 
-    def shift_by(what: str, wrong: ArrayLike) -> dict[str, float]:
-        return _shift(freq, as_square(what, wrong, freq.size), variance, joint, expected)
-
+    ways = biased if isinstance(biased, Mapping) else {} if biased is None else {"": biased}
+    names = {way: f"biased {one_line(way)}" if way else "biased" for way in ways}
+    wrong = {way: as_square(names[way], own, freq.size) for way, own in ways.items()}
     rows = information_rows(freq, lines, variance, kinds)
     size = 1 / np.sqrt(2 * np.einsum("lfp,lfp->p", rows.conj(), rows).real)  # stiffness and damping differ by much
     rows = rows * size
@@ -171,10 +174,7 @@ def plan_joint_frfs(
         line_share,
         frf_share.reshape(-1, 2 * n, 2 * n),
         {name: narrowest_band(freq, share) for name, share in zip(expected, line_share, strict=True)},
-        shift_by("biased", biased) if biased is not None and not isinstance(biased, Mapping) else {},
-        {way: shift_by(f"biased {one_line(way)}", own) for way, own in biased.items()}
-        if isinstance(biased, Mapping)
-        else {},
+        {way: _shift(freq, own, variance, joint, expected) for way, own in wrong.items()},
     )
 
 

@@ -13,6 +13,7 @@ import scipy.linalg
 from jointfrf.cases.keys import FITTED, Observed
 from jointfrf.cases.known_joint.keys import KnownJointCase
 from jointfrf.cases.structure import Structure
+from jointfrf.channels.point_lines import difference_weights
 from jointfrf.dofs import direction_names, is_rotation
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -151,20 +152,19 @@ def _difference_weights(structure: Structure, dofs: Sequence[str], spacing: floa
         places = structure.places
         if node not in places:
             raise ValueError(f"the place of node {node} is not known: no difference can stand for {dof}")
-        ends = {}
+        ends = set()
         for way in (-1, 1):
             wanted = places[node] + way * spacing * np.eye(3)[axis]
             nearest = min(places, key=lambda one: float(np.linalg.norm(places[one] - wanted)))
             if np.linalg.norm(places[nearest] - wanted) < _NEAR * spacing:
-                ends[nearest] = float(places[nearest][axis])
+                ends.add(nearest)
         if not ends:
             raise ValueError(
                 f"no node lies {spacing:g} m beside {node} along {'xyz'[axis]}: rotation {dof} has no difference"
             )
-        if len(ends) == 1:
-            ends[node] = float(places[node][axis])
-        (first, x), (last, y) = ends.items()
-        found.append({f"{first}:{along}": sign / (x - y), f"{last}:{along}": sign / (y - x)})
+        nodes = sorted(ends) if len(ends) == 2 else [node, *ends]
+        slopes = difference_weights([places[one][axis] - places[node][axis] for one in nodes])[1]
+        found.append({f"{one}:{along}": sign * slope for one, slope in zip(nodes, slopes.tolist(), strict=True)})
     return found
 
 
