@@ -145,17 +145,18 @@ class InterfaceFrfs(NamedTuple):
     def of_dofs(self, dofs: NDArray[np.intp]) -> LineData:
         """Return the entries between some joint DOFs with their whitening."""
         at = np.concatenate([dofs, dofs + self.n])
-        t_r, t_f = self.responses[at], self.forces[at]
         entries = FrfEntries.of(len(dofs), reciprocal=self.reciprocal)
+        frfs = self if self.noise_paths is not None else self._of_channels_of(at)
+        t_r, t_f = frfs.responses[at], frfs.forces[at]
         share = None
         # Shares by channel do not commute with models of the sides, which carry noise between channels: those of h_pq
         # and h_qp are then a half.
         is_square = np.array_equal(self.responses, self.forces)
         if self.reciprocal and not self.symmetrised and is_square and self.noise_paths is None:
-            share = direction_share(self.variance)
+            share = direction_share(frfs.variance)
 
         def of_lines(own: slice) -> list[NDArray[Any]]:
-            part = self.on_lines(own)
+            part = frfs.on_lines(own)
             part = part if share is None else part._made_reciprocal(share)
             measured = entries.take(_mean(between(t_r, part.measured, t_f), self.reciprocal))
             if part.noise_paths is None:
@@ -166,6 +167,16 @@ class InterfaceFrfs(NamedTuple):
 
         measured, *weights = in_pieces(len(self.measured), of_lines)
         return LineData(entries, measured, self.smooth_of(dofs), *weights)
+
+    def _of_channels_of(self, at: NDArray[np.intp]) -> InterfaceFrfs:
+        """Return the same without channels that some joint DOFs do not take; what is there where they take all."""
+        rows, columns = (np.flatnonzero(t[at].any(axis=0)) for t in (self.responses, self.forces))
+        if (rows.size, columns.size) == self.measured.shape[1:]:
+            return self
+        return self._replace(
+            measured=taken(self.measured, rows, columns), variance=taken(self.variance, rows, columns),
+            responses=self.responses[:, rows], forces=self.forces[:, columns],
+        )  # fmt: skip
 
     def smooth_of(self, dofs: NDArray[np.intp]) -> ComplexArray:
         """Return the smooth FRFs between some joint DOFs, shape (n_freq, q); what is there where these are all."""
