@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections import Counter
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -184,19 +185,25 @@ def _settings(figure: Figure) -> Any:
 
 def _make_drawable(canvas: Any) -> None:
     """Check texts, which may come from a file: wrong formulas are drawn as plain text, invisible characters escaped."""
-    from matplotlib.mathtext import MathTextParser
     from matplotlib.text import Text
 
-    formulas = MathTextParser("path")
     for text in canvas.findobj(Text):
-        words = visible(text.get_text(), "\n")
-        try:
-            if "$" in words:
-                formulas.parse(words)
-        except ValueError:
-            words = words.replace("$", r"\$")
-        if words != text.get_text():
-            text.set_text(words)
+        if words := text.get_text():
+            text.set_text(_drawable(words))
+
+
+@cache
+def _drawable(words: str) -> str:
+    """Return a text as it can be drawn."""
+    from matplotlib.mathtext import MathTextParser
+
+    words = visible(words, "\n")
+    try:
+        if "$" in words:
+            MathTextParser("path").parse(words)
+    except ValueError:
+        words = words.replace("$", r"\$")
+    return words
 
 
 def _names(panel: Panel) -> list[str]:
