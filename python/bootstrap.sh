@@ -4,8 +4,11 @@
 #
 #   sh python/bootstrap.sh run     what the cases need
 #   sh python/bootstrap.sh docs    also what the documentation site needs
-#   sh python/bootstrap.sh test    also what the tests need; a browser, CalculiX and readers of files of Nastran and
-#                                  Ansys where there are such to install: without them their tests are skipped
+#   sh python/bootstrap.sh test    also what the tests need; CalculiX where there is one to install
+#   sh python/bootstrap.sh all     also what the long tests need: the kernel for all processors; a browser, and readers
+#                                  of files of Nastran and Ansys where there are such to install
+#
+# Tests of what could not be installed are skipped.
 #
 # PYTHON names the interpreter for a new .venv, FC and CC the compilers.
 # Exit status: 3 when system packages are missing and may not be installed from here, 1 for any other failure.
@@ -13,10 +16,11 @@ set -eu
 
 case ${1-} in
   # Kernels for other processors than this one are compiled where they are tested.
-  run) extras=all instruction_sets=own ;;
-  docs) extras=all,docs instruction_sets=own ;;
-  test) extras=all,test,docs instruction_sets=all ;;
-  *) echo "usage: $0 run|docs|test" >&2; exit 2 ;;
+  run) extras=all instruction_sets=own stamps=run ;;
+  docs) extras=all,docs instruction_sets=own stamps='run docs' ;;
+  test) extras=all,test,docs instruction_sets=own stamps='run docs test' ;;
+  all) extras=all,test,docs instruction_sets=all stamps='run docs test all' ;;
+  *) echo "usage: $0 run|docs|test|all" >&2; exit 2 ;;
 esac
 root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd -P)
 cd "$root"
@@ -25,8 +29,8 @@ log=$root/build/set-up.log
 lock=$root/build/set-up.lock
 stamp=$venv/set-up
 readers=build/installed-readers.json
-# Folders of packages that cases and commands do not import, or little of.
-not_compiled='/(tests|fontTools|mesonbuild|pip|setuptools|pkg_resources|plotly|statsmodels|sphinx|babel)/'
+# Packages that cases, commands and tests import, much of each.
+imported='_pytest h5py hypothesis jinja2 matplotlib numpy PIL pyparsing scipy'
 
 say() { echo "jointfrf: $*" >&2; }
 
@@ -245,8 +249,8 @@ up_to_date() {
     ls build/cp*/build.ninja >/dev/null 2>&1
 }
 
-# The versions of the checked-in list, so that a new release of a dependency breaks no fresh clone. What pip compiles, a
-# good half of it tests, would take as long as all else that it does. To be called in a subshell.
+# The versions of the checked-in list, so that a new release of a dependency breaks no fresh clone. What pip compiles,
+# most of it never imported, would take as long as all else that it does. To be called in a subshell.
 # exec_pip_install REPORT ARGUMENT...
 exec_pip_install() {
   report=$1
@@ -279,9 +283,10 @@ install_packages() {
   trap 'kill $! 2>/dev/null; exit 1' TERM
   wait $! || return 1
   check_installed build/installed-run.json
-  # A file that cannot be compiled is not for this version of Python, and is not imported.
-  "$venv/bin/python" -m compileall -q -x "$not_compiled" "$venv"/lib*/python*/site-packages || :
-  [ "$1" != test ] || install_readers
+  # A file that cannot be compiled is not for this version of Python, and is not imported; not all are there to cases.
+  for package in $imported; do echo "$venv"/lib/python*/site-packages/"$package"; done |
+    "$venv/bin/python" -m compileall -qq -x '/tests/' -i - || :
+  [ "$1" != all ] || install_readers
 }
 
 # Wheels of pyYeti and ansys-mapdl-reader, for a few tests: large, and not there for every system. Not compiled ahead.
@@ -318,11 +323,9 @@ make_venv() {
   beside=
   cat build/packages.log >>"$log"
   [ $status = 0 ] || fail "could not install what the package needs"
-  state >"$stamp.run"
-  [ "$1" = run ] || state >"$stamp.docs"
-  [ "$1" = test ] || return 0
-  [ -f "$readers" ] || say "no wheels of pyYeti and ansys-mapdl-reader: tests of files of Nastran and Ansys will be skipped"
-  state >"$stamp.test"
+  for each in $stamps; do state >"$stamp.$each"; done
+  [ "$1" != all ] || [ -f "$readers" ] ||
+    say "no wheels of pyYeti and ansys-mapdl-reader: tests of files of Nastran and Ansys will be skipped"
 }
 
 # An editable installation keeps no compiled modules by itself: each start of a command would compile some two hundred.
@@ -344,9 +347,7 @@ if [ "$missing" ]; then
   find_missing
   [ -z "$missing" ] || fail "still missing after installation:$missing"
 fi
-if [ "$1" = test ]; then
-  offer browser pages chromium chromium-browser google-chrome google-chrome-stable
-  offer calculix 'FE programs' ccx
-fi
+case $1 in test | all) offer calculix 'FE programs' ccx ;; esac
+[ "$1" != all ] || offer browser pages chromium chromium-browser google-chrome google-chrome-stable
 make_venv "$1"
 compile_modules

@@ -55,6 +55,7 @@ def table(tmp_path_factory):
     return run(*LEVELS, "--each", *MODEL, "--out", folder), folder
 
 
+@pytest.mark.long
 def test_intervals_hold_the_joint_at_the_levels(table, make):
     """95 % intervals of eight files: of 16 numbers at most one or two lie outside."""
     result, folder = table
@@ -70,6 +71,7 @@ def test_intervals_hold_the_joint_at_the_levels(table, make):
     assert result.stderr == ""
 
 
+@pytest.mark.long
 def test_the_table_in_the_readme_is_what_the_command_prints(table):
     readme = DOCUMENTS["cases/lap-beam/README.md"]
     (command,), (shown,) = blocks("sh", readme), blocks("text", readme)
@@ -79,6 +81,7 @@ def test_the_table_in_the_readme_is_what_the_command_prints(table):
     agree(table[0].stdout.strip().split("\n\n")[0], shown)
 
 
+@pytest.mark.long
 def test_each_test_has_files_of_its_own(table):
     _, folder = table
     assert {path.name for path in folder.iterdir()} == {"parameters.csv", *(path.stem for path in LEVELS)}

@@ -343,7 +343,7 @@ def _workers(children: Path) -> list[str]:
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="children are listed by Linux")
-@pytest.mark.parametrize("delay", [0, 0.2, *(pytest.param(each, marks=pytest.mark.long) for each in (0.1, 0.4, 0.8))])
+@pytest.mark.parametrize("delay", [0, *(pytest.param(each, marks=pytest.mark.long) for each in (0.1, 0.2, 0.4, 0.8))])
 def test_an_interrupt_while_processes_start_ends_all_of_them(delay):
     words = ["study", "3.1", "--estimator", "ismm", "--realisations", "1000000", "--jobs", "2", "--out", "study"]
     with subprocess.Popen([sys.executable, "-m", "jointfrf", *words], stdout=-1, stderr=-1, text=True,

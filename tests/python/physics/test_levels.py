@@ -303,6 +303,7 @@ def test_a_backbone_that_does_not_fit_its_assembly_is_an_error(believed_beam):
     assert "not positive" in stiff.warnings[0]
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("always::jointfrf.FrfCheckWarning")
 def test_the_command_refuses_bent_frfs_unless_they_are_accepted(believed_beam, of_two_springs, capsys, tmp_path):
     freq = np.arange(215.0, 255.0, 0.5)

@@ -1,6 +1,6 @@
 """Matrices of Nastran and Ansys as these programs wrote them: the files that come with pyYeti and ansys-mapdl-reader.
 
-Both packages are large extras: the tests are skipped where they are not installed.
+Both packages are large extras, which `./tests/run --all` installs: the tests are skipped where they are not there.
 """
 
 import random
@@ -15,6 +15,8 @@ import jointfrf as jf
 from jointfrf.errors import FileContentError
 from jointfrf.extras import import_extra
 from jointfrf.io.fe.matrix_formats import read_matrix
+
+pytestmark = pytest.mark.long
 
 
 @pytest.fixture(scope="module")
