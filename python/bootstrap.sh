@@ -285,7 +285,7 @@ install_packages() {
   check_installed build/installed-run.json
   # A file that cannot be compiled is not for this version of Python, and is not imported; not all are there to cases.
   for package in $imported; do echo "$venv"/lib/python*/site-packages/"$package"; done |
-    "$venv/bin/python" -m compileall -qq -x '/tests/' -i - || :
+    "$venv/bin/python" -m compileall -qq -j 2 -x '/tests/' -i - || :
   [ "$1" != all ] || install_readers
 }
 
@@ -297,6 +297,9 @@ install_readers() {
   trap 'kill $! 2>/dev/null; exit 1' TERM
   if wait $!; then check_installed "$readers"; else rm -f "$readers"; fi
 }
+
+# An editable installation keeps no compiled modules by itself: each start of a command would compile some two hundred.
+compile_modules() { "$venv/bin/python" -m compileall -qq python/jointfrf || :; }
 
 make_venv() {
   if ! venv_works; then
@@ -318,6 +321,7 @@ make_venv() {
   beside=$!
   (exec_pip_install build/installed-own.json --no-build-isolation --no-deps "--config-settings=setup-args=-Dinstruction_sets=$instruction_sets" -e .) \
     >>"$log" 2>&1 || fail "could not build the package"
+  compile_modules
   status=0
   wait "$beside" || status=1
   beside=
@@ -327,9 +331,6 @@ make_venv() {
   [ "$1" != all ] || [ -f "$readers" ] ||
     say "no wheels of pyYeti and ansys-mapdl-reader: tests of files of Nastran and Ansys will be skipped"
 }
-
-# An editable installation keeps no compiled modules by itself: each start of a command would compile some two hundred.
-compile_modules() { "$venv/bin/python" -m compileall -qq python/jointfrf || :; }
 
 up_to_date "$1" && compile_modules && exit
 if ! mkdir -p build 2>/dev/null || [ ! -w build ] || [ ! -w . ]; then
@@ -350,4 +351,3 @@ fi
 case $1 in test | all) offer calculix 'FE programs' ccx ;; esac
 [ "$1" != all ] || offer browser pages chromium chromium-browser google-chrome google-chrome-stable
 make_venv "$1"
-compile_modules
