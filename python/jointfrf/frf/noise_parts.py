@@ -28,7 +28,7 @@ _BINS = 32
 #: Points of the grids of the logarithm of the odds of two parts, each about the best of the last, and the reach of the
 #: first: |h|^2 of lightly damped structures spans 14 decades, e^32, and either part may count at its end of them. Odds
 #: are known to 1 % in the end.
-_GRIDS = tuple(np.linspace(-1, 1, points)[:, None] for points in (41, 21, 21))
+_GRIDS = tuple(np.linspace(-1, 1, points)[:, None] for points in (65, 25, 25))
 _WIDEST = 40.0
 #: A running median is taken at so many lines within its reach: neighbouring windows share most of their lines.
 _STEPS = 5
