@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections import Counter
-from functools import cache
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -192,7 +192,7 @@ def _make_drawable(canvas: Any) -> None:
             text.set_text(_drawable(words))
 
 
-@cache
+@lru_cache(1000)
 def _drawable(words: str) -> str:
     """Return a text as it can be drawn."""
     from matplotlib.mathtext import MathTextParser

@@ -60,7 +60,7 @@ def table(request, tmp_path_factory):
 
 
 def test_intervals_hold_the_joint_at_the_levels(table, make):
-    """95 % intervals of eight files: of 16 numbers at most one or two lie outside."""
+    """The 95 % interval of each file holds what the file was made with."""
     result, folder, levels = table
     rows = list(csv.DictReader((folder / "parameters.csv").read_text().splitlines()))
     held = {"k_theta_z": [], "eta_theta_z": []}

@@ -130,7 +130,7 @@ def frfs_by_differences(case: KnownJointCase, spacing: float) -> ComplexArray:
     sides, h = [], []
     for structure, point in ((case.a, "j"), (case.b, "k")):
         dofs = list(case.points[point])
-        weights = _difference_weights(structure, dofs, spacing)
+        weights = _dof_weights(structure, dofs, spacing)
         dofs += dict.fromkeys(dof for row in weights for dof in row if dof not in dofs)
         sides.append(np.array([[row.get(dof, 0.0) for dof in dofs] for row in weights]))
         h.append(structure.receptance(freq, dofs))
@@ -140,7 +140,7 @@ def frfs_by_differences(case: KnownJointCase, spacing: float) -> ComplexArray:
     return found
 
 
-def _difference_weights(structure: Structure, dofs: Sequence[str], spacing: float) -> list[dict[str, float]]:
+def _dof_weights(structure: Structure, dofs: Sequence[str], spacing: float) -> list[dict[str, float]]:
     """Return which DOFs each DOF is a sum of, and their weights."""
     found = []
     for dof in dofs:

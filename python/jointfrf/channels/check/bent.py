@@ -23,8 +23,8 @@ _RISE, _SHARE = 3.0, 1 / 8
 #: Peaks and responses that are looked at for each force, the largest ones: more hardly add to what one mode shows.
 #: Fewer responses cannot agree.
 _PEAKS, _RESPONSES, _LEAST = 10, 8, 3
-#: Steps of the search for the pole, and change, in halves of the band, at which it is found: of third order in what is
-#: left, after the further powers.
+#: Steps of the search for the pole, and change, in halves of the band of the peak, at which it is found: it is of third
+#: order in what the further powers leave.
 _STEPS, _FOUND = 15, 1e-4
 #: Chance, divided by the number of peaks, and shift in half bandwidths from which a resonance is called bent: less
 #: hardly changes the FRF, other modes that the powers do not quite describe reach 0.1, and 2 % of noise of the force

@@ -146,7 +146,7 @@ class InterfaceFrfs(NamedTuple):
         """Return the entries between some joint DOFs with their whitening."""
         at = np.concatenate([dofs, dofs + self.n])
         entries = FrfEntries.of(len(dofs), reciprocal=self.reciprocal)
-        frfs = self if self.noise_paths is not None else self._of_channels_of(at)
+        frfs = self if self.noise_paths is not None else self._with_channels_of(at)
         t_r, t_f = frfs.responses[at], frfs.forces[at]
         share = None
         # Shares by channel do not commute with models of the sides, which carry noise between channels: those of h_pq
@@ -168,7 +168,7 @@ class InterfaceFrfs(NamedTuple):
         measured, *weights = in_pieces(len(self.measured), of_lines)
         return LineData(entries, measured, self.smooth_of(dofs), *weights)
 
-    def _of_channels_of(self, at: NDArray[np.intp]) -> InterfaceFrfs:
+    def _with_channels_of(self, at: NDArray[np.intp]) -> InterfaceFrfs:
         """Return the same without channels that some joint DOFs do not take; what is there where they take all."""
         rows, columns = (np.flatnonzero(t[at].any(axis=0)) for t in (self.responses, self.forces))
         if (rows.size, columns.size) == self.measured.shape[1:]:
