@@ -272,8 +272,8 @@ def gradients_of(fit: GroupFit, changes: Iterable[ComplexArray]) -> FloatArray:
     adjoint = fit.joint.slope(fit.x, fit.joint.compliance(fit.x)).conj()
 
     def gradients(targets: tuple[ComplexArray, ...]) -> list[FloatArray]:
-        found = (_of_coordinates(problem, forms, forms, c)[0].gradient for forms in normal_forms(data, c, on, targets))
-        return [np.einsum("lqp,lq,l->p", adjoint, one, used).real for one in found]
+        found, _ = _of_coordinates(problem, normal_forms(data, c, on, targets))
+        return [np.einsum("lqp,lq,l->p", adjoint, one.gradient, used).real for one in found]
 
     # Together they share what is linearised: as many at once as take no more memory than the lines do.
     (base,), found, more = gradients((data.smooth,)), [], iter(changes)
@@ -318,8 +318,7 @@ def effects_of(
     # A form is factorised once for all changes of a call.
     at_once = max(_AT_ONCE, _MOST_ENTRIES // max(fitted.size, 1))
     while some := tuple(fitted + change for change in itertools.islice(more, at_once)):
-        for forms in normal_forms(own, c, point, some):
-            left = _of_coordinates(here, forms, forms, c)[0]
+        for left in _of_coordinates(here, normal_forms(own, c, point, some))[0]:
             gradient, squares = np.einsum("lqp,lq->lp", adjoint, left.gradient), left.squares * used
             yield np.where(np.isfinite(gradient), gradient, 0), np.where(np.isfinite(squares), squares, 0)
 
@@ -492,7 +491,7 @@ def _first_points(data: LineData, c: ComplexArray) -> OnManifold:
 def _linearised(
     problem: GroupProblem, c: ComplexArray, on: OnManifold, used: NDArray[np.bool_], prior: PriorOfM | None
 ) -> tuple[LineForms, ComplexArray | None]:
-    """Return what `_of_coordinates` does, lines that are not used weighing nothing; in chunks of lines."""
+    """Return forms of the coordinates, lines that are not used weighing nothing, and the unknown entries; in chunks."""
     found = np.zeros_like(c) if problem.unknown.any() else None
 
     def of_lines(own: slice) -> Sequence[NDArray[Any]]:
@@ -501,10 +500,12 @@ def _linearised(
         if prior is not None:
             point = expected_m(here.data, c[own], point, prior.on_lines(own))
         targets = (here.data.measured, here.data.smooth) if here.unknown.any() else (here.data.measured,)
-        found_forms = normal_forms(here.data, c[own], point, targets)
-        forms, some = _of_coordinates(here, found_forms[0], found_forms[-1], c[own])
-        if found is not None and some is not None:
-            found[own] = some
+        of_targets = normal_forms(here.data, c[own], point, targets)
+        (forms, *_), inverse = _of_coordinates(here, of_targets)
+        if found is not None and inverse is not None:
+            step = (inverse @ of_targets[-1].gradient[..., None])[..., 0]
+            found[own] = np.where(here.unknown.reshape(c[own].shape), c[own], 0)
+            found[own] += np.tensordot(step, here.data.entries.units, 1)
         return forms.scaled(used[own].astype(float))
 
     return LineForms(*in_pieces(len(c), of_lines)), found
@@ -550,48 +551,51 @@ def _rescued(data: LineData, c: ComplexArray, on: OnManifold) -> OnManifold:
     return OnManifold(h, m, squares)
 
 
-def _of_coordinates(
-    problem: GroupProblem, forms: LineForms, of_smooth: LineForms, c: ComplexArray
-) -> tuple[LineForms, ComplexArray | None]:
-    """Return the forms of the entries of C that the coordinates change, and the unknown ones of the smooth FRFs.
+def _of_coordinates(problem: GroupProblem, several: Sequence[LineForms]) -> tuple[list[LineForms], ComplexArray | None]:
+    """Return the forms of one linearisation in the entries of C that the coordinates change.
 
-    Entries of C that are unknown on a line are eliminated from its form; all others that the coordinates do not change
-    are zero.
+    Entries of C that are unknown on a line are eliminated; the inverse of their weights, zero elsewhere, is returned,
+    too, where there are any. All others that the coordinates do not change are zero.
     """
     n, places, joint = problem.data.entries.n, _unit_places(problem.data), problem.joint
-    unknown, found = problem.unknown[:, places], None
+    unknown, inverse = problem.unknown[:, places], None
     if unknown.any():
-        forms, step = _eliminated(forms, of_smooth, unknown)
-        found = np.where(problem.unknown, c.reshape(len(c), -1), 0).reshape(c.shape)
-        found += np.tensordot(step, problem.data.entries.units, 1)
+        several, inverse = _eliminated(several, unknown)
+    compliance, weight = several[0].compliance, several[0].weight
+    gradients = [forms.gradient for forms in several]
     upper, lower = joint.rows * n + joint.columns, joint.columns * n + joint.rows
     if places.size == n * n > len(upper) > n:
         # C is symmetric, and all its entries are there.
         fold = (places[:, None] == upper).astype(float) + ((places[:, None] == lower) & (upper != lower))
-        return LineForms(
-            forms.compliance[:, upper], fold.T @ forms.weight @ fold, forms.gradient @ fold, forms.squares
-        ), found
-    if len(upper) < places.size:
+        compliance, weight = compliance[:, upper], fold.T @ weight @ fold
+        gradients = [gradient @ fold for gradient in gradients]
+    elif len(upper) < places.size:
         changed = np.zeros(n * n, bool)
         changed[upper] = True
         kept = np.flatnonzero(changed[places])
-        weight = forms.weight[:, kept[:, None], kept]
-        forms = LineForms(forms.compliance[:, kept], weight, forms.gradient[:, kept], forms.squares)
-    return forms, found
+        compliance, weight = compliance[:, kept], weight[:, kept[:, None], kept]
+        gradients = [gradient[:, kept] for gradient in gradients]
+    return [
+        LineForms(compliance, weight, gradient, forms.squares)
+        for gradient, forms in zip(gradients, several, strict=True)
+    ], inverse
 
 
-def _eliminated(forms: LineForms, of_smooth: LineForms, unknown: NDArray[np.bool_]) -> tuple[LineForms, ComplexArray]:
-    """Minimise each form over its unknown entries; return the forms left, and the step there of the smooth FRFs."""
-    w, p = forms.weight, forms.gradient
+def _eliminated(several: Sequence[LineForms], unknown: NDArray[np.bool_]) -> tuple[list[LineForms], ComplexArray]:
+    """Minimise forms of the same weights over their unknown entries; return the inverse of these weights, too."""
+    w = several[0].weight
     size = np.sqrt(np.maximum(np.einsum("lqq->lq", w).real, TINY))
     outer = size[:, :, None] * size[:, None, :]
     both = unknown[:, :, None] & unknown[:, None, :]
     masked = np.where(both, w / outer, 0) + (~unknown)[:, :, None] * np.eye(w.shape[1])
     inverse = np.where(both, np.linalg.pinv(masked, hermitian=True), 0) / outer
-    across = w @ inverse
-    known = ~unknown
+    across, known = w @ inverse, ~unknown
     weight = (w - across @ w) * known[:, :, None] * known[:, None, :]
-    gradient = (p - (across @ p[..., None])[..., 0]) * known
-    squares = forms.squares - (p.conj() * (inverse @ p[..., None])[..., 0]).real.sum(axis=1)
-    step = (inverse @ of_smooth.gradient[..., None])[..., 0]
-    return LineForms(forms.compliance, weight, gradient, squares), step
+    # Of all forms at once, shape (n_freq, q, n_forms).
+    p = np.stack([forms.gradient for forms in several], axis=2)
+    gradient = (p - across @ p) * known[:, :, None]
+    taken = (p.conj() * (inverse @ p)).real.sum(axis=1)
+    return [
+        LineForms(forms.compliance, weight, gradient[:, :, i], forms.squares - taken[:, i])
+        for i, forms in enumerate(several)
+    ], inverse
