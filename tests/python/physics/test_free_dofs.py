@@ -63,11 +63,18 @@ def test_a_soft_dof_is_not_free():
         assert 29.5 < high < 40
 
 
-@pytest.mark.parametrize("damping", ["viscous", pytest.param("auto", marks=pytest.mark.long)])
-def test_a_hinge_has_both_bounds(damping):
-    """Rigid in y and free in theta, as a pin with some friction: 1/k and k are zero in one fit."""
+@pytest.mark.parametrize(
+    ("damping", "seeds"),
+    [("viscous", (0, 60)), ("auto", (10,)), pytest.param("auto", (0, 1, 2, 27), marks=pytest.mark.long)],
+)
+def test_a_hinge_has_both_bounds(damping, seeds):
+    """Rigid in y and free in theta, as a pin with some friction: 1/k and k are zero in one fit.
+
+    With the FRFs nearest to 10 and 27 for those of the structure, 1/k of y would seem known a million times better; 60
+    ends at a compliance so small that nothing of its damping is left.
+    """
     exact = beams(jf.Joint([1e11, 0.0], [0.0, 0.1], DOFS))
-    for seed in range(3):
+    for seed in seeds:
         with pytest.warns(jf.IdentificationWarning):
             fit = jf.identify(FREQ, jf.pollute(exact, 0.01, seed=seed), DOFS, damping=damping)
         limits = fit.confidence_interval()
@@ -86,7 +93,10 @@ def test_a_hinge_has_both_bounds(damping):
 
 @pytest.mark.parametrize(
     ("damping", "seeds"),
-    [pytest.param("none", [(0.01, 0), (0.01, 1), (0.05, 1)], marks=pytest.mark.long), ("viscous", [(0.01, 1)])],
+    [
+        pytest.param("none", [(0.01, 0), (0.01, 1), (0.01, 18), (0.01, 21), (0.05, 1)], marks=pytest.mark.long),
+        ("viscous", [(0.01, 1)]),
+    ],
 )
 def test_a_pin_without_damping_is_free(damping, seeds):
     """Nothing but noise is in gamma_jk of theta: no joint in compliances is near it, one in k of theta is."""

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from jointfrf.dofs import Parameter, ParameterKind, joint_parameters, parameters_shared, point_and_direction
 from jointfrf.identification.manifold.line_forms import LEAST_GAIN, STEPS, FormMinimum, JointCoordinates, LineForms
+from jointfrf.identification.minimise import inverse_information
 from jointfrf.identification.parameters import ParameterVector, joint_vector
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.kernel.call import call, call_for_number
@@ -57,6 +58,8 @@ _ALL_DAMPING = 0.1
 _COARSE = 1e-2
 #: Relative standard error of a compliance from which on intervals come from the profile of the likelihood.
 _CURVED = 0.1
+#: Of a compliance with this relative error, damping is not known: its rate is taken below 1 where it is linearised.
+_HARDLY = 0.3
 
 
 class JointTerms(NamedTuple):
@@ -329,6 +332,26 @@ class DiagonalJoint(SpringJoint):
             if there.cost < found.cost - _COARSE:
                 found = self.minimise(forms, there.x, held, least_gain)
         return found
+
+    def within_sight(self, minimum: FormMinimum, x: FloatArray) -> FloatArray:
+        """Return where to linearise: no nearer to a rigid joint, nor at a larger rate, than the data resolve."""
+        n, own = self.n, self.is_compliance[: self.n]
+        error = np.sqrt(np.maximum(np.diagonal(minimum.covariance), TINY))
+        hardly = own & ~(error[:n] <= _HARDLY * x[:n])
+        of_rate = hardly[self.dofs[n:]]
+        at = x.copy()
+        if hardly.any():
+            # The size of C itself: of a DOF that is mostly damping, the compliance alone may be anything.
+            size = abs(self.compliance(x)).mean(axis=0)
+            at[n:][of_rate] = 0.0
+            slope = self.slope(at, self.compliance(at))
+            known = np.r_[np.ones(n, bool), ~of_rate]
+            information = (slope.conj().swapaxes(1, 2) @ minimum.forms.weight @ slope).real.sum(axis=0)
+            error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * information[np.ix_(known, known)])), 0))
+            at[:n] = np.where(hardly, np.maximum(size, error[:n]), x[:n])
+        at[:n] = np.maximum(at[:n], np.where(own & np.isfinite(error[:n]), error[:n], 0))
+        at[n:] = np.where(of_rate, np.clip(x[n:], -self.rate_of_one, self.rate_of_one), x[n:])
+        return at
 
     def may_be_rigid(self, i: int) -> bool:
         """Whether a parameter is of a DOF whose coordinate is its compliance."""

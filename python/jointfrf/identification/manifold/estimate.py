@@ -447,7 +447,7 @@ def _reported(group: GroupFit) -> tuple[FloatArray, FloatArray]:
     """Return coordinates that give finite parameters, and the covariance with that of rates of rigid DOFs.
 
     A stiffness beyond what the data can resolve stays a number; its interval says that it is open. Rates that nothing
-    shows because their DOF was found rigid have a variance of zero by a pseudo-inverse. They get the variance that they
+    shows because their DOF was found rigid have no variance to speak of, or none that ends: they get that which they
     would have if the compliance were as large as its standard error.
     """
     joint, x, covariance = group.joint, group.x.copy(), group.covariance
@@ -455,15 +455,18 @@ def _reported(group: GroupFit) -> tuple[FloatArray, FloatArray]:
     if not a.any():
         return x, covariance
     error = np.sqrt(np.maximum(np.diagonal(covariance)[a], 0))
-    hidden = np.flatnonzero((x[joint.dofs] == 0) & a[joint.dofs] & ~a)
+    least = np.zeros(joint.n)
+    least[a[: joint.n]] = _ROUNDING * group.problem.data.own_size[a[: joint.n]]
+    hidden = np.flatnonzero((x[joint.dofs] < least[joint.dofs]) & ~a)
     if hidden.size:
         at = x.copy()
         at[a] = np.maximum(at[a], error)
         slope = joint.slope(at, joint.compliance(at))[:, :, hidden]
         information = np.einsum("lqh,lqr,lrh->h", slope.conj(), group.forms.weight, slope).real
         covariance = covariance.copy()
+        covariance[hidden], covariance[:, hidden] = 0, 0
         covariance[hidden, hidden] = 1 / np.maximum(2 * information, TINY)
-    x[a] = np.maximum(x[a], np.maximum(_RIGID * error, _ROUNDING * group.problem.data.own_size[a[: joint.n]]))
+    x[a] = np.maximum(x[a], np.maximum(_RIGID * error, least[joint.dofs[a]]))
     return x, covariance
 
 

@@ -25,7 +25,6 @@ from jointfrf.identification.manifold.on_manifold import (
     smooth_compliance,
     starts_on_manifold,
 )
-from jointfrf.identification.minimise import inverse_information
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
 __all__ = [
@@ -74,8 +73,6 @@ _FEW_STARTS = 2
 _AT_ONCE = 8
 #: Entries of changed FRFs held at once where more changes than that are: 64 MB.
 _MOST_ENTRIES = 2**22
-#: Of a compliance with this relative error, damping is not known: its rate is taken below 1 where it is linearised.
-_HARDLY = 0.3
 #: Factors by which poorly determined DOFs are made softer: at first, and where that led nowhere.
 _SOFTER, _SOFTER_STILL = 3.0, 4.0
 
@@ -380,7 +377,9 @@ def _iterated(
         )
         if step == 1 or not problem.sides_bend:
             on = _rescued(data, c, on)
-        used = lines.near(on, step)
+        before, used = np.count_nonzero(lines.last), lines.near(on, step)
+        # Of lines that come near only now, the joint does not know yet.
+        is_whole = step > 1 and np.count_nonzero(used) <= before
         # Unknown entries of C move on all lines: they may bring a line back to where it is used.
         forms, unknown = _linearised(problem, c, on, used, choice_of_m.prior)
         minimum = joint.lowest(forms, x)
@@ -388,7 +387,7 @@ def _iterated(
         # In standard errors along the direction of the step: what the data do not see may go anywhere.
         moved = float(np.sqrt(abs(2 * (change @ minimum.information @ change))))
         is_lost = minimum.cost > _LOST * count
-        converged = choice_of_m.holds_for(minimum, step) and bool(moved < _MOVED * np.sqrt(x.size)) and step > 1
+        converged = choice_of_m.holds_for(minimum, step) and bool(moved < _MOVED * np.sqrt(x.size)) and is_whole
         if length.is_spent and not converged and moved < _SWINGS * np.sqrt(x.size):
             # Between the two ends, a tenth of the way of which was the last step.
             minimum, converged = FormMinimum(x, *FormSquares(forms, joint).linearised(x), forms, joint), True
@@ -399,7 +398,7 @@ def _iterated(
                 iterations=step, converged=converged, on=kept,
             )  # fmt: skip
         x = x + length.of(change, minimum.information, is_lost=is_lost) * change
-        linearised_at = _within_sight(minimum, x) if joint.in_compliance else joint.within_sight(minimum, x)
+        linearised_at = joint.within_sight(minimum, x)
         # Of a long sweep the forms of one step take as much memory as those of the next.
         del forms, minimum
     raise AssertionError
@@ -441,7 +440,7 @@ class _ChoiceOfM:
     """
 
     def __init__(self, problem: GroupProblem) -> None:
-        self._prior = prior_of_m(problem.data) if problem.joint.in_compliance else None
+        self._prior = prior_of_m(problem.data) if problem.joint.is_compliance.any() else None
         self.prior = self._prior
 
     def holds_for(self, minimum: FormMinimum, step: int) -> bool:
@@ -509,27 +508,6 @@ def _linearised(
         return forms.scaled(used[own].astype(float))
 
     return LineForms(*in_pieces(len(c), of_lines)), found
-
-
-def _within_sight(minimum: FormMinimum, x: FloatArray) -> FloatArray:
-    """Return where to linearise: not nearer to a rigid joint, nor at a larger rate of one, than the data resolve."""
-    joint, n = minimum.joint, minimum.joint.n
-    error = np.sqrt(np.maximum(np.diagonal(minimum.covariance), 1e-300))
-    hardly = ~(error[:n] <= _HARDLY * x[:n])
-    of_rate = hardly[joint.dofs[n:]]
-    at = x.copy()
-    if hardly.any():
-        # The size of C itself: of a DOF that is mostly damping, the compliance alone may be anything.
-        size = abs(joint.compliance(x)).mean(axis=0)
-        at[n:][of_rate] = 0.0
-        slope = joint.slope(at, joint.compliance(at))
-        known = np.r_[np.ones(n, bool), ~of_rate]
-        information = (slope.conj().swapaxes(1, 2) @ minimum.forms.weight @ slope).real.sum(axis=0)
-        error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * information[np.ix_(known, known)])), 0))
-        at[:n] = np.where(hardly, np.maximum(size, error[:n]), x[:n])
-    at[:n] = np.maximum(at[:n], np.where(np.isfinite(error[:n]), error[:n], 0))
-    at[n:] = np.where(of_rate, np.clip(x[n:], -joint.rate_of_one, joint.rate_of_one), x[n:])
-    return at
 
 
 def _unit_places(data: LineData) -> NDArray[np.intp]:

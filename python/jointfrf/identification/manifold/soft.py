@@ -131,9 +131,9 @@ class SoftJoint(DiagonalJoint):
         return self.minimise(forms, start, held, least_gain)
 
     def within_sight(self, minimum: FormMinimum, x: FloatArray) -> FloatArray:
-        """Return where to linearise: no soft DOF nearer to free than the data can resolve."""
+        """Return where to linearise: no soft DOF nearer to free, and no other to rigid, than the data can resolve."""
         error = np.sqrt(np.maximum(np.diagonal(minimum.covariance), TINY))
-        at = x.copy()
+        at = super().within_sight(minimum, x)
         k = self._of_soft & self.is_stiffness
         at[k] = np.maximum(x[k], _SIGHT * error[k])
         return at
