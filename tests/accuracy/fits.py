@@ -32,7 +32,7 @@ from jointfrf.dofs import Parameter, parameters_shared
 from jointfrf.identification.manifold.coordinates import joint_terms
 
 #: Terms of a truth that is not named by them.
-_TERMS = {"free": "viscous", "free, undamped": "none"}
+_TERMS = {"free": "viscous", "free, undamped": "none", "pin": "viscous", "pin, undamped": "none"}
 #: A parameter so many times away from the truth, while its interval says otherwise, has run off.
 _RUN_OFF = 3.0
 #: Half, and nine of ten, of normal errors are below this number of their standard deviations.

@@ -51,9 +51,10 @@ def _beams(freq: np.ndarray, elements: tuple[int, int], factor: float, kind: str
     a = jf.beam(0.3, elements[0], ends=("clamped", "free"), **section)
     b = jf.beam(0.225, elements[1], **section)
     joint = jf.Joint(np.array([6e5, 5e3]) * factor, np.array([20, 1.5]) * factor, ["y", "theta"])
-    if kind.startswith("free"):
-        # theta has no stiffness; no DOF has damping where it is "free, undamped".
-        joint = jf.Joint([6e5, 0.0], [0.0, 0.0] if "undamped" in kind else [20.0, 0.1], ["y", "theta"])
+    if kind.startswith(("free", "pin")):
+        # theta has no stiffness, and y of a pin is rigid; no DOF has damping where it is "undamped".
+        k, c = (1e11, 0.0) if kind.startswith("pin") else (6e5, 20.0)
+        joint = jf.Joint([k, 0.0], [0.0, 0.0] if "undamped" in kind else [c, 0.1], ["y", "theta"])
     else:
         joint = _damped(joint, kind)
     tip = str(elements[0] + 1)
@@ -243,7 +244,9 @@ def _trials() -> dict[str, list[Trial]]:
     free = [
         Trial("3.3", "complex", level, damping=damping, kind=kind)
         for level in (0.01, 0.05)
-        for damping, kind in (("viscous", "free"), ("none", "free, undamped"), ("auto", "free"))
+        for damping, kind in (
+            ("viscous", "free"), ("none", "free, undamped"), ("auto", "free"), ("auto", "pin"), ("none", "pin, undamped"),
+        )  # fmt: skip
     ]
     return {
         "bound": [

@@ -25,12 +25,11 @@ __all__ = [
 
 #: Entries are binned by |h|^2 into so many bins: within one the variance is nearly the same.
 _BINS = 32
-#: Logarithms of the odds of two parts that are tried: |h|^2 of lightly damped structures spans 14 decades, e^32, and
-#: either part may count at its end of them; the likelihood varies over a few units. Newton steps from the best of them.
-_LOG_ODDS = np.linspace(-40, 40, 41)
-_NEWTON = 5
-#: Second derivatives of the likelihood of a line below this show no minimum.
-_STRAIGHT = 1e-9
+#: Points of the grids of the logarithm of the odds of two parts, each about the best of the last, and the reach of the
+#: first: |h|^2 of lightly damped structures spans 14 decades, e^32, and either part may count at its end of them. Odds
+#: are known to 1 % in the end.
+_GRIDS = tuple(np.linspace(-1, 1, points)[:, None] for points in (65, 25, 25))
+_WIDEST = 40.0
 #: A running median is taken at so many lines within its reach: neighbouring windows share most of their lines.
 _STEPS = 5
 #: Iterations of the likelihood of the parts; each lowers it, and the best of the starts is taken.
@@ -78,8 +77,8 @@ def noise_parts(squares: FloatArray, terms: FloatArray, *, robust: bool = False)
 
     Notes
     -----
-    The likelihood is -sum(log v + y/v). For two terms its maximum is found by their odds, the size of both following
-    from these; for more terms by multiplicative updates
+    The likelihood is -sum(log v + y/v). For two terms its maximum is found on a grid of the share of the second,
+    refined twice, the size of both following from the share; for more terms by multiplicative updates
     part *= sqrt(sum term y/v^2 / sum term/v), which never lower the likelihood, from one start a term with that term
     nearly alone, and one with all alike. The estimate holds for any distribution of e with this variance; it is
     efficient for circular normal e.
@@ -126,35 +125,19 @@ class NoiseTerms:
 
 
 def _two_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:
-    """Parts of two terms of mean 1, shape (2, n_entries).
-
-    The likelihood depends on the odds alone, e^t, as the first part follows from them. Newton steps for t that leave
-    what is known to hold the minimum give way to its middle.
-    """
+    """Parts of two terms of mean 1, shape (2, n_entries)."""
+    centre, reach, entries = np.zeros(len(y)), _WIDEST, np.arange(len(y))
     weighted, total, first = count * y, count.sum(), np.maximum(a[0], TINY)
-    # Variances over the first part, shape (n_odds, n_entries, n_bins).
-    v = np.exp(_LOG_ODDS)[:, None, None] * a[1]
-    v += first
-    loss = total * np.log(np.maximum((weighted / v).sum(axis=2) / total, TINY))
-    loss += np.log(v, out=v) @ count
-    t = _LOG_ODDS[loss.argmin(axis=0)]
-    low, high = t - np.ptp(_LOG_ODDS[:2]), t + np.ptp(_LOG_ODDS[:2])
-    for _ in range(_NEWTON):
-        second = np.exp(t)[:, None] * a[1]
-        v = second + first
-        share, squares = second / v, weighted / v
-        size = np.maximum(squares.sum(axis=1), TINY)
-        squares *= share
-        mean = squares.sum(axis=1) / size
-        slope = share @ count - total * mean
-        bend = (share - share**2) @ count
-        bend -= total * ((squares * (1 - 2 * share)).sum(axis=1) / size + mean**2)
-        low, high = np.where(slope < 0, t, low), np.where(slope > 0, t, high)
-        t = t - slope / np.where(bend > _STRAIGHT * total, bend, np.inf)
-        t = np.where((t > low) & (t < high), t, (low + high) / 2)
-    odds = np.exp(t)
-    part = (weighted / (odds[:, None] * a[1] + first)).sum(axis=1) / total
-    return np.asarray(part * np.stack([np.ones(len(y)), odds]))
+    for grid in _GRIDS:
+        # Variances over the part of the first, shape (grid, n_entries, n_bins), and what this part is for them.
+        odds = np.exp(centre + reach * grid)
+        v = odds[:, :, None] * a[1]
+        v += first
+        part = (weighted / v).sum(axis=2) / total
+        loss = np.log(v, out=v) @ count + total * np.log(np.maximum(part, TINY))
+        best = loss.argmin(axis=0), entries
+        centre, reach = np.log(odds[best]), 2 * reach / (len(grid) - 1)
+    return np.asarray(part[best] * np.stack([np.ones(len(y)), odds[best]]))
 
 
 def _several_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -201,9 +200,9 @@ class JointCalibration(NamedTuple):
         Of the parameters.
     excess, excess_error : float
         Mean square of the residual that they leave, in units of the noise, and its standard error.
-    between : callable
-        ``between(group, member, inverse)`` returns the covariance, shape (n_parts, p, p), of what they make coordinates
-        of parts of the band differ from those of all lines: lines of each part, and the inverse of its information.
+    by_group : mapping
+        Of each group, by its DOFs, what unit errors of each kind do to its gradient on the parts of the band.
+    errors : CalibrationErrors
     """
 
     factor: FloatArray
@@ -212,7 +211,29 @@ class JointCalibration(NamedTuple):
     covariance: FloatArray
     excess: float
     excess_error: float
-    between: Callable[[GroupFit, FloatArray, FloatArray], FloatArray]
+    by_group: Mapping[tuple[int, ...], Mapping[ErrorKind, FloatArray]]
+    errors: CalibrationErrors
+
+    def between(self, group: GroupFit, which: NDArray[np.bool_], inverse: FloatArray) -> FloatArray:
+        """Return the covariance of what errors make coordinates of parts of the band differ from those of all lines.
+
+        Parameters
+        ----------
+        group : GroupFit
+        which : ndarray of bool, shape (n_parts,)
+        inverse : ndarray, shape (n_chosen, p, p)
+            Of the information of each part chosen.
+
+        Returns
+        -------
+        ndarray, shape (n_chosen, p, p)
+        """
+        whole, found = inverse_information(group.information), np.zeros_like(inverse)
+        for kind, variance, _ in self.errors.kinds():
+            gradient = self.by_group[tuple(group.dofs.tolist())][kind]
+            steps = gradient[:, :, which] @ inverse - (gradient.sum(axis=2) @ whole)[:, :, None]
+            found += np.einsum("af,eabfp,eabfq->bpq", variance, steps, steps, optimize=True)
+        return found
 
 
 def joint_calibration(
@@ -240,9 +261,15 @@ def joint_calibration(
     p = len(found.parameters)
     factor, degrees, share, covariance = np.zeros(p), np.full(p, np.inf), np.zeros(p), np.zeros((p, p))
     excess = error = 0.0
+    by_group: dict[tuple[int, ...], dict[ErrorKind, FloatArray]] = {}
     for group in found.groups:
-        spread = _group_calibration(group, frfs, freq_hz, errors)
-        which, slope = group.which, group.joint.theta_slope(group.x)
+        effects = _effects(group, frfs, freq_hz, errors)
+        by_group[tuple(group.dofs.tolist())] = {kind: one.steps for kind, one in effects.items()}
+        which, slope, inverse = group.which, group.joint.theta_slope(group.x), inverse_information(group.information)
+        of_all = {
+            kind: Effects(one.steps.sum(axis=2) @ inverse, one.squares.sum(axis=1)) for kind, one in effects.items()
+        }
+        spread = CalibrationSpread.of(errors, slope, of_all.__getitem__)
         own, of_theta = np.diagonal(group.covariance), slope @ spread.covariance @ slope.T
         by_noise = np.einsum("ij,jk,ik->i", slope, group.covariance, slope)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -256,43 +283,28 @@ def joint_calibration(
         excess += spread.squares
         error = float(np.hypot(error, spread.squares_error))
     equations = max(found.equations - p / 2, 1.0)
-    between = partial(_between_parts, frfs, errors, errors.functions(freq_hz))
-    return JointCalibration(factor, degrees, share, covariance, excess / equations, error / equations, between)
+    return JointCalibration(factor, degrees, share, covariance, excess / equations, error / equations, by_group, errors)
 
 
-def _between_parts(
-    frfs: InterfaceFrfs,
-    errors: CalibrationErrors,
-    functions: FloatArray,
-    group: GroupFit,
-    member: FloatArray,
-    inverse: FloatArray,
-) -> FloatArray:
-    whole, found = inverse_information(group.information), np.zeros_like(inverse)
-    for kind, variance, _ in errors.kinds():
-        for gradient, _ in effects_of(group, _unit_errors(frfs, group.dofs, errors, kind)):
-            parts = np.einsum(
-                "afl,bl,alp->abfp", functions, member, np.stack([gradient.real, -gradient.imag]), optimize=True
-            )
-            steps = parts @ inverse - (parts.sum(axis=1) @ whole)[:, None]
-            found += np.einsum("af,abfp,abfq->bpq", variance, steps, steps)
-    return found
-
-
-def _group_calibration(
+def _effects(
     group: GroupFit, frfs: InterfaceFrfs, freq_hz: FloatArray, errors: CalibrationErrors
-) -> CalibrationSpread:
-    """Return what smooth errors do to the coordinates of a group."""
-    functions, inverse = errors.functions(freq_hz), inverse_information(group.information)
+) -> dict[ErrorKind, Effects]:
+    """Return by how much unit errors of each kind change the gradient on each part of the band, and their squares.
 
-    def effects(kind: ErrorKind) -> Effects:
-        parts = []
-        for own in line_slices(len(freq_hz)):
+    Shapes (number, 2, n_parts, n_functions, p) and (2, n_parts, n_functions).
+    """
+    by_part = errors.functions(freq_hz)[:, None] * group.band_parts[:, None]
+    n_parts, n_functions, n_freq = by_part.shape[1:]
+    by_part, p = by_part.reshape(2, -1, n_freq), group.x.size
+    found: dict[ErrorKind, Effects] = {}
+    for kind, *_ in errors.kinds():
+        some = []
+        for own in line_slices(n_freq):
             changes = _unit_errors(frfs.on_lines(own), group.dofs, errors, kind)
-            parts.append(effects_by_function(effects_of(group, changes, own), functions[:, :, own], inverse))
-        return Effects(np.sum([one.steps for one in parts], axis=0), np.sum([one.squares for one in parts], axis=0))
-
-    return CalibrationSpread.of(errors, group.joint.theta_slope(group.x), effects)
+            some.append(effects_by_function(effects_of(group, changes, own), by_part[:, :, own], np.eye(p)))
+        steps, squares = (np.sum(parts, axis=0) for parts in zip(*some, strict=True))
+        found[kind] = Effects(steps.reshape(-1, 2, n_parts, n_functions, p), squares.reshape(2, n_parts, n_functions))
+    return found
 
 
 def _unit_errors(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from jointfrf.identification.manifold.on_manifold import (
     smooth_compliance,
     starts_on_manifold,
 )
+from jointfrf.identification.scatter import BLOCKS
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
 __all__ = [
@@ -182,6 +184,14 @@ class GroupFit(FormMinimum):
     def which(self) -> NDArray[np.intp]:
         """Parameters of the group among all."""
         return self.problem.which
+
+    @cached_property
+    def band_parts(self) -> FloatArray:
+        """Lines used of parts of the band that are compared, 1 and 0, shape (n_parts, n_freq)."""
+        member = np.zeros((BLOCKS, self.used.size))
+        for of_part, own in zip(member, np.array_split(np.flatnonzero(self.used), BLOCKS), strict=True):
+            of_part[own] = 1
+        return member
 
     @property
     def noise_squares(self) -> float:
@@ -379,7 +389,7 @@ def _iterated(
             on = _rescued(data, c, on)
         before, used = np.count_nonzero(lines.last), lines.near(on, step)
         # Of lines that come near only now, the joint does not know yet.
-        is_whole = step > 1 and np.count_nonzero(used) <= before
+        is_whole = step > 1 and bool(np.count_nonzero(used) <= before)
         # Unknown entries of C move on all lines: they may bring a line back to where it is used.
         forms, unknown = _linearised(problem, c, on, used, choice_of_m.prior)
         minimum = joint.lowest(forms, x)

@@ -327,10 +327,7 @@ def _trends(
     whole = group.covariance
     # In parameters, not in coordinates: where only k drifts, c/k does, and c does not.
     theta, slope = group.joint.theta(group.x), group.joint.theta_slope(group.x)
-    parts = np.array_split(lines, BLOCKS)
-    member = np.zeros((BLOCKS, freq_hz.size))
-    for of_part, own in zip(member, parts, strict=True):
-        of_part[own] = 1
+    member = group.band_parts
     gradient, information = group.of_groups(member)
     size = np.sqrt(np.maximum(np.einsum("bpp->bp", information), TINY))
     value = abs(np.linalg.eigvalsh(information / (size[:, :, None] * size[:, None, :])))
@@ -346,7 +343,7 @@ def _trends(
         variance = np.einsum("ij,bjk,ik->bi", slope, covariance - whole, slope)
         variance = np.maximum(variance, 0) * factor
         if calibration is not None:
-            more = calibration.between(group, member[seen], 2 * covariance)
+            more = calibration.between(group, seen, 2 * covariance)
             variance += np.einsum("ij,bjk,ik->bi", slope, more, slope)
         errors[seen] = np.sqrt(variance)
     found = []
@@ -359,6 +356,6 @@ def _trends(
         squares = ((changes[known, i] / errors[known, i]) ** 2).sum()
         probability = float(special.chdtrc(np.count_nonzero(known) - 1, squares))
         if probability < _DISAGREE / p:
-            centres = np.array([freq_hz[own].mean() for own in parts])
+            centres = member @ freq_hz / member.sum(axis=1)
             found.append(Trend(name, centres[known], values[known, i], probability))
     return found
