@@ -19,8 +19,7 @@ import jointfrf as jf
 from installed_library import installed_library  # noqa: F401
 from jointfrf.cases import catalogue
 from jointfrf.cases.known_joint.compute import KnownJointResult
-from jointfrf.report.draw import Drawing
-from thinned_cases import compute_thinned
+from thinned_cases import DrawSome, compute_thinned
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -144,7 +143,7 @@ def thinned(once) -> Callable[[str], KnownJointResult]:
 @pytest.fixture
 def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave the pictures of a case empty: to draw them takes most of the time of a short one."""
-    monkeypatch.setattr(catalogue, "draw", lambda figure: Drawing(b"", b"<svg/>"))
+    monkeypatch.setattr(catalogue, "draw", DrawSome())
 
 
 @pytest.fixture

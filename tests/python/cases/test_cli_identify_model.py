@@ -19,6 +19,7 @@ from jointfrf.cli.export import CardRequest
 from jointfrf.cli.identify_model import _place_of_joint, _rigid_faces
 from jointfrf.io import read_frfs, write_frfs
 from jointfrf.models.points import PointPatch
+from thinned_cases import DrawSome
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
 LAP = CASES / "lap-beam"
@@ -54,9 +55,11 @@ def test_the_files_are_what_make_writes(make):
     params=[pytest.param([LEVELS[0], LEVELS[-1]], id="ends"), pytest.param(LEVELS, id="all", marks=pytest.mark.long)],
 )
 def table(request, tmp_path_factory):
-    """The fits of the first and the last level, and of all: what was said, the folder, and the levels."""
+    """The fits of the first and the last level, and of all: what was said, the folder with empty pictures, levels."""
     folder = tmp_path_factory.mktemp("lap") / "out"
-    return run(*request.param, "--each", *MODEL, "--out", folder), folder, request.param
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("jointfrf.report.fit.draw", DrawSome())
+        return run(*request.param, "--each", *MODEL, "--out", folder), folder, request.param
 
 
 def test_intervals_hold_the_joint_at_the_levels(table, make):

@@ -18,6 +18,7 @@ from jointfrf.io.cards import CardFormat
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Curve, Figure, Panel, figure_csv
 from jointfrf.report.table import Table, table_csv
+from thinned_cases import DrawSome
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("jinja2")
@@ -49,6 +50,7 @@ def test_names_in_a_case_are_no_paths_no_orders_and_no_formulas(tmp_path, monkey
     deep = tmp_path / "a" / "b" / "c" / "d"
     deep.mkdir(parents=True)
     monkeypatch.chdir(deep)
+    monkeypatch.setattr("jointfrf.cases.catalogue.draw", DrawSome(frozenset([f"identified-k_{DOF}", "noise"])))
     case = case_of_a_stranger(tmp_path / "case")
     shown = run_command("run", case, "--out", "results", "--realisations", "2", "--jobs", "1")
     assert shown.returncode == 0, shown.stderr

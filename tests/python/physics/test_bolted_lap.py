@@ -31,6 +31,19 @@ def default():
     return tight, tight.model()
 
 
+@pytest.fixture(
+    scope="module",
+    params=[LapDivisions(across=6, circles=1), pytest.param(LapDivisions(), marks=pytest.mark.long)],
+    ids=["coarse", "default"],
+)
+def meshed(request):
+    """Case study 2, on a mesh that shows the same and on its own."""
+    if request.param == LapDivisions():
+        return request.getfixturevalue("default")
+    tight = preload(bolted_lap(divisions=request.param), FORCE)
+    return tight, tight.model()
+
+
 @pytest.fixture(scope="module")
 def short():
     """Short beams on a coarse mesh, for what does not need more."""
@@ -143,8 +156,8 @@ def test_static_state_of_the_case_study(default):
     assert tight.interfaces["nut"].closed.all()
 
 
-def test_forces_balance_on_every_body(default):
-    tight, _ = default
+def test_forces_balance_on_every_body(meshed):
+    tight, _ = meshed
     at = {name: tight.lap.mesh.nodes[pairs.upper] for name, pairs in tight.lap.interfaces.items()}
     force = {name: state.force for name, state in tight.interfaces.items()}
     # The bolt: head on its upper side, nut below. B: lap above, nut below; nothing else holds it.
@@ -156,8 +169,8 @@ def test_forces_balance_on_every_body(default):
         assert abs(moment).max() < 1e-7 * FORCE * 0.01
 
 
-def test_pressure_is_symmetric(default):
-    tight, _ = default
+def test_pressure_is_symmetric(meshed):
+    tight, _ = meshed
     for name, pairs in tight.lap.interfaces.items():
         place = tight.lap.mesh.nodes[pairs.upper]
         mirrored = place * [-1, 1, 1]
@@ -167,8 +180,8 @@ def test_pressure_is_symmetric(default):
         assert pressure.min() >= 0
 
 
-def test_pressure_maps(default):
-    tight, _ = default
+def test_pressure_maps(meshed):
+    tight, _ = meshed
     maps = tight.pressure_maps()
     assert list(maps) == ["head", "lap", "nut"]
     for name, one in maps.items():
@@ -180,9 +193,13 @@ def test_pressure_maps(default):
         assert (one.pressure[~one.closed] == 0).all()
 
 
-def test_frequencies_of_the_case_study(default):
-    _, model = default
+def test_frequencies_of_the_case_study(meshed):
+    tight, model = meshed
     freq = model.natural_frequencies(7)
+    if len(tight.lap.mesh.elements) < 3000:  # a coarser mesh is stiffer, by less where the joint turns less
+        assert (freq > CALCULIX).all()
+        assert abs(freq / CALCULIX - 1).max() < 0.012
+        return
     assert abs(freq / CALCULIX - 1).max() < 0.0015
     # The same with other meshes; the fifth mode, which turns the joint, depends on them most.
     assert abs(freq / [14.67, 60.48, 86.94, 261.4, 346.8, 485.6, 554.2] - 1).max() < 0.005
@@ -195,8 +212,8 @@ def test_frequencies_of_one_point_bricks():
     assert abs(freq / [12.79, 59.88, 75.78, 228.0, 342.4, 423.3, 487.8] - 1).max() < 0.004
 
 
-def test_model_takes_its_outputs_from_all_nodes(default):
-    tight, model = default
+def test_model_takes_its_outputs_from_all_nodes(meshed):
+    tight, model = meshed
     assert isinstance(model.dofs, tuple)
     assert model.loss_factor == 0.01
     assert model.structural_damping is None

@@ -6,6 +6,8 @@ import dataclasses
 
 from jointfrf.cases.catalogue import find_case, read_case
 from jointfrf.cases.known_joint.compute import KnownJointResult, compute
+from jointfrf.report.draw import Drawing, draw
+from jointfrf.report.figure import Figure
 
 #: Every so many lines are left and so many realisations drawn. Tails are looked at where there are 300.
 _SHORT = {
@@ -25,3 +27,13 @@ def compute_thinned(name: str) -> KnownJointResult:
     step, count = _SHORT[name]
     case = read_case(find_case(name))
     return compute(dataclasses.replace(case, freq_hz=case.freq_hz[::step]), count)
+
+
+@dataclasses.dataclass(frozen=True)
+class DrawSome:
+    """Stands for `draw` in a case, in its processes too: draw the figures of these keys and leave the others empty."""
+
+    keys: frozenset[str] = frozenset()
+
+    def __call__(self, figure: Figure) -> Drawing:
+        return draw(figure) if figure.key in self.keys else Drawing(b"", b"<svg/>")
