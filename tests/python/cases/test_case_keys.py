@@ -16,6 +16,7 @@ from jointfrf.toml.declared import keys_of
 from jointfrf.toml.documents import schema_of
 from jointfrf.toml.table import TomlTable, read_toml
 from own_case import write_by_matrices, write_by_receptances
+from thinned_cases import DrawSome
 
 #: Cases that are read without a mesh.
 QUICK = (*(find_case(number) for number in ("3.1", "3.2", "4.3.3")), list_cases()[-1])
@@ -191,8 +192,9 @@ LONG = pytest.param("known-joint", marks=pytest.mark.long)
 
 
 @pytest.mark.parametrize("kind", [LONG if kind == "known-joint" else kind for kind in (*KINDS, "study")])
-def test_a_template_runs_as_it_stands(kind, tmp_path, capsys, monkeypatch):
+def test_a_template_runs_as_it_stands(kind, tmp_path, capsys, monkeypatch, without_pictures):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("jointfrf.studies.result.draw", DrawSome())
     assert main(["new", kind, "own"]) == 0
     text = (tmp_path / "own" / "case.toml").read_text()
     assert text.startswith("#:schema ./case.schema.json\n")

@@ -31,7 +31,7 @@ NAMES = [*PLANE, *SOLID, "4.3.3-bolt"]
 #: Realisations of the plane cases of beams.
 COUNT = 60
 #: Realisations where tails are looked at.
-MANY = 300
+MANY = 150
 
 
 @pytest.fixture(scope="module")

@@ -21,6 +21,7 @@ from command import run_command
 from jointfrf.__main__ import main as started
 from jointfrf.cli.main import main
 from jointfrf.cli.parser import COMMANDS, command_parser
+from thinned_cases import DrawSome
 
 ROOT = Path(__file__).resolve().parents[3]
 BARS = ROOT / "cases" / "hammer-test" / "two_bars.uff"
@@ -262,8 +263,10 @@ def test_what_an_option_needs_is_checked_before_the_work(monkeypatch, package, w
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links need rights on Windows")
-def test_paths_through_a_link_mean_what_the_system_means(tmp_path):
+def test_paths_through_a_link_mean_what_the_system_means(tmp_path, monkeypatch):
     """link/.. is the folder above that of the link's target, not the one that holds the link."""
+    for module in ("report.fit", "studies.result"):
+        monkeypatch.setattr(f"jointfrf.{module}.draw", DrawSome())
     (tmp_path / "real" / "deep").mkdir(parents=True)
     (tmp_path / "link").symlink_to(Path("real") / "deep")
     words = ["--out", "link/../out", "--save", "link/../new.json", "--report", "link/../page/r.html"]
@@ -402,7 +405,9 @@ def test_an_interrupt_while_the_command_is_imported(monkeypatch, capsys):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="a shell of POSIX")
-@pytest.mark.parametrize("end", [">&-", "| true", "2>&- >&-", "2>&1 | true"])
+@pytest.mark.parametrize(
+    "end", ["| true", "2>&- >&-", *(pytest.param(each, marks=pytest.mark.long) for each in (">&-", "2>&1 | true"))]
+)
 def test_files_are_written_though_nobody_reads(end):
     words = shlex.join([sys.executable, "-m", "jointfrf", "identify", str(BARS), *JOINT, "--save", "kept.json"])
     line = f"set -o pipefail; {words} {end}"

@@ -36,7 +36,11 @@ def test_frequencies_of_a_cantilever(tmp_path):
     assert ours == pytest.approx(theirs, rel=1e-3)
 
 
-@pytest.fixture(scope="module", params=[ContactLaw(1e6, None, None), ContactLaw()], ids=["ties", "springs"])
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(ContactLaw(1e6, None, None), marks=pytest.mark.long), ContactLaw()],
+    ids=["ties", "springs"],
+)
 def joint(request):
     """A preloaded lap joint, and the linear model of its contacts in CalculiX."""
     lap = bolted_lap((0.15, 0.12), divisions=LapDivisions(across=6, rings=1, circles=1))

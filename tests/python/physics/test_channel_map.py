@@ -36,12 +36,18 @@ def measured():
     return jf.pollute(assembly(JOINT).receptance(FREQ, RESPONSES, FORCES), 0.02, seed=1)
 
 
+@pytest.fixture(scope="module")
+def plain(measured):
+    """The fit that looks for no wrong channels."""
+    return fitted(measured, find_wrong_channels=False)
+
+
 def turned(h):
     return h * np.array([1, 1, -1, 1])[:, None]
 
 
-def test_right_names_change_nothing(measured):
-    (with_search, (said,)), (without, none) = fitted(measured), fitted(measured, find_wrong_channels=False)
+def test_right_names_change_nothing(measured, plain):
+    (with_search, (said,)), (without, none) = fitted(measured), plain
     assert with_search.value == without.value
     assert said.severity == "note"
     assert said.text.startswith("10 signs and exchanges of channels were tried, and none fits as well as")
@@ -56,12 +62,12 @@ def test_right_names_change_nothing(measured):
         (lambda h: h[:, :, ::-1], "forces A/2:y and B/7:y exchanged", ("A/2:y", "B/7:y")),
     ],
 )
-def test_one_fault_is_named_and_taken(measured, fault, named, about):
+def test_one_fault_is_named_and_taken(measured, plain, fault, named, about):
     fit, (said,) = fitted(fault(measured))
     assert said.severity == "warning"
     assert f"the fit takes {named}: " in said.text
     assert said.about == about
-    assert fit.value == pytest.approx(fitted(measured, find_wrong_channels=False)[0].value, rel=1e-6)
+    assert fit.value == pytest.approx(plain[0].value, rel=1e-6)
     assert fit.residual_is_noise
 
 

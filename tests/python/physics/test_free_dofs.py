@@ -32,7 +32,7 @@ def fits(joint, damping, level, count=12):
     ("c", "damping", "level"),
     [
         ((20.0, 0.1), "viscous", 0.01),
-        ((20.0, 0.1), "viscous", 0.05),
+        pytest.param((20.0, 0.1), "viscous", 0.05, marks=pytest.mark.long),
         pytest.param((0.0, 0.0), "none", 0.01, marks=pytest.mark.long),
     ],
 )

@@ -131,8 +131,8 @@ def test_there_are_26_kinds():
 
 @pytest.mark.parametrize("operation", OPERATIONS)
 def test_every_operation_on_every_kind(operation):
-    for kind in KINDS:
-        for n in (1, 3):
+    for number, kind in enumerate(KINDS):
+        for n in (1, 3) if number % 5 == 0 else (3,):  # of order 1 most kinds are one number
             _, lost, wrong, worst = compared(operation, kind, n, 1.0)
             assert (lost, wrong) == (0, 0), (kind, n, worst)
 
@@ -143,14 +143,14 @@ def test_every_operation_on_every_kind(operation):
 @pytest.mark.parametrize("scale", SCALES)
 def test_every_scale(operation, scale):
     """Products of two sizes may overflow where the result does not: such lines have a code, never wrong numbers."""
-    held = 0
-    for kind in KINDS:
-        for n in (1, 3):
+    held = tried = 0
+    for number, kind in enumerate(KINDS):
+        for n in (1, 3) if number % 5 == 0 else (3,):  # of order 1 most kinds are one number
             inside, lost, wrong, worst = compared(operation, kind, n, SCALES[scale])
             assert wrong == 0, (kind, n, worst)
-            held += inside - lost
+            held, tried = held + inside - lost, tried + LINES
     if operation in ("invert", "transform"):
-        assert held > LINES * len(KINDS)
+        assert held > tried / 2
 
 
 @pytest.mark.parametrize("engine", ["lapack", "plain"])

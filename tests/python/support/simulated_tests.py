@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -39,6 +39,7 @@ class SimulatedTest:
         return jf.check_frfs(self.frfs.freq_hz, h, joint=joint)
 
 
+@lru_cache(4)
 def simulated_test(seed: int) -> SimulatedTest:
     """A test without a fault: kind of bodies, places, band, joint and noise are drawn."""
     rng = np.random.default_rng(seed)

@@ -9,10 +9,10 @@ from jointfrf.cases.known_joint.compute import KnownJointResult, compute
 from jointfrf.report.draw import Drawing, draw
 from jointfrf.report.figure import Figure
 
-#: Every so many lines are left and so many realisations drawn. Tails are looked at where there are 300.
+#: Every so many lines are left and so many realisations drawn. Tails are looked at where there are 120.
 _SHORT = {
     "3.1-discrete": (1, 60),
-    "3.2-fe-beams": (1, 300),
+    "3.2-fe-beams": (1, 120),
     "3.3-beams-1mm": (3, 60),
     "3.3.1-decoupling": (3, 60),
     "3.3.1a-two-translations": (3, 60),

@@ -26,6 +26,8 @@ EPS = np.finfo(float).eps
 TOLERANCE = 300
 ORDERS = [*range(1, 14), 24, 33, 48, 64, 65]
 COUNTS = [1, 2, 3, 7, 8, 9, 63, 64, 65, 200]
+#: Of these the short run leaves out those between two that take the same ways.
+BETWEEN = {"order": {7, 10, 11, 12, 48}, "lines": {2, 3, 63}}
 
 
 @dataclass
@@ -321,12 +323,22 @@ def check_parity(call: Call, leave_out: tuple[int, ...] = ()) -> None:
         assert (rcond_fast <= 1).all(), what
 
 
-@pytest.mark.parametrize(("operation", "n"), [(o, n) for o in OPERATIONS for n in ORDERS if n <= LARGEST.get(o, 65)])
+@pytest.mark.parametrize(
+    ("operation", "n"),
+    [
+        pytest.param(o, n, marks=pytest.mark.long if n in BETWEEN["order"] else ())
+        for o in OPERATIONS
+        for n in ORDERS
+        if n <= LARGEST.get(o, 65)
+    ],
+)
 def test_every_order(operation, n):
     check_parity(OPERATIONS[operation](Maker(n, 19 if n < 24 else 9)))
 
 
-@pytest.mark.parametrize("n_freq", COUNTS)
+@pytest.mark.parametrize(
+    "n_freq", [pytest.param(n, marks=pytest.mark.long if n in BETWEEN["lines"] else ()) for n in COUNTS]
+)
 def test_every_number_of_lines(operation, n_freq):
     for n in (1, 2, 3, 4, 5, 6, 8):
         if n <= LARGEST.get(operation, 65):

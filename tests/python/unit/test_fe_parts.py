@@ -26,8 +26,19 @@ def model():
     return block()
 
 
-@pytest.mark.parametrize("units", ["SI", "mm-t-s", "mm-kg-ms"])
-@pytest.mark.parametrize("form", WRITERS)
+def _is_short(form, units):
+    """A format gives numbers, which units scale whatever the format: each once, and all of both in the long run."""
+    return units == "mm-t-s" or form == "calculix"
+
+
+@pytest.mark.parametrize(
+    ("form", "units"),
+    [
+        pytest.param(form, units, marks=() if _is_short(form, units) else pytest.mark.long)
+        for form in WRITERS
+        for units in ("SI", "mm-t-s", "mm-kg-ms")
+    ],
+)
 def test_every_format_gives_the_same_frfs(tmp_path, model, form, units):
     part = jf.read_part(part_toml(tmp_path, model, form, units=units, more=JOINT))
     last = max((dof for dof in model.dofs), key=lambda dof: int(dof.partition(":")[0])).partition(":")[0]
@@ -315,7 +326,7 @@ def test_files_cut_and_changed_anywhere(tmp_path, form):
         if path.suffix in (".toml", ".inp"):
             continue
         sound = path.read_bytes()
-        for _ in range(25):
+        for _ in range(12):
             content = bytearray(sound[: chance.randrange(1, len(sound))])
             for _ in range(chance.randrange(4)):
                 start = chance.randrange(len(content))

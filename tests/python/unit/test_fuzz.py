@@ -20,7 +20,7 @@ from fuzz.parts import PARTS, make_part
 from fuzz.python_calls import public_callables
 from fuzz.watch import Found, attack
 
-SHORT = {"calls": 500, "files": 150, "abi": 1500, "overlaps": 50, "commands": 20}
+SHORT = {"calls": 250, "files": 150, "abi": 1500, "overlaps": 50, "commands": 20}
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="processes and limits of Linux")
 
 
@@ -110,7 +110,7 @@ def test_a_second_set_up_needs_no_network():
 
 
 @linux
-@pytest.mark.parametrize("name", ["with blanks", "größe-测试", "a$b;c&d"])
+@pytest.mark.parametrize("name", ["größe-测试", "a $b; c&d"])
 def test_two_set_ups_at_an_odd_place_take_turns(tmp_path, name):
     """Both fail, since no interpreter is given: each in a sentence, one after the other, and no lock is left."""
     clone = drills.small_clone(tmp_path / name)

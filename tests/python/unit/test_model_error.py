@@ -196,8 +196,7 @@ def test_no_error_is_found_in_models_that_are_right(exact):
     [
         ("modulus", True),
         ("modulus", False),
-        ("mass", True),
-        pytest.param("mass", False, marks=pytest.mark.long),
+        *(pytest.param("mass", exact, marks=pytest.mark.long) for exact in (True, False)),
         ("large modulus", False),
     ],
 )
