@@ -31,7 +31,7 @@ from jointfrf.solids.preload import preload
 from thinned_cases import DrawSome
 
 FOLDER = find_case("4.3.3")
-COARSE = LapDivisions(across=6, rings=1, circles=0, head=1, nut=1)
+COARSE = LapDivisions(across=4, rings=1, circles=0, head=1, nut=1)
 #: Columns of `rigid_motion` in the order of the joint DOFs.
 ORDER = [DIRECTIONS.index(dof) for dof in DOFS]
 CROSS = FivePoints(np.array([0.001, 0.006, 0.2875]), (0.008, 0.012))

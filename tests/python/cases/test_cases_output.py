@@ -3,6 +3,7 @@
 import csv
 import io
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -41,9 +42,14 @@ class Ran(NamedTuple):
 def ran(tmp_path_factory):
     """One command, two processes: one parameter a kind, several methods on beams, a case that fails, one behind it."""
     folder = tmp_path_factory.mktemp("results")
-    beams, wrong = (tmp_path_factory.mktemp("cases") / name for name in ("beams", "wrong"))
+    cases = tmp_path_factory.mktemp("cases")
+    chain, beams, wrong, behind = (cases / name for name in ("3.1-discrete", "beams", "wrong", "behind"))
     beams.mkdir()
     wrong.mkdir()
+    for own in (chain, behind):
+        shutil.copytree(find_case("3.1"), own)
+        text = (own / "case.toml").read_text()
+        (own / "case.toml").write_text(text.replace("step = 0.01", "step = 0.1"))
     (wrong / "case.toml").write_text("title = 1\n")
     for name in ("case.toml", "expected.toml", "README.md"):
         text = (find_case("3.3.1") / name).read_text()
@@ -61,7 +67,7 @@ def ran(tmp_path_factory):
         outputs[case.name] = run_case(case, *arguments, **options)
         return outputs[case.name]
 
-    words = ("3.1", beams, wrong, "3.2", "--realisations", "4", "--jobs", "2", "--out", folder)
+    words = (chain, beams, wrong, behind, "--realisations", "4", "--jobs", "2", "--out", folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("jointfrf.cli.run.run_case", kept)
         patch.setattr("jointfrf.cases.catalogue.draw", DrawSome(DRAWN))
@@ -136,7 +142,7 @@ def test_report_holds_every_table_and_figure_and_no_link(outputs):
 def test_report_escapes_what_a_user_writes(tmp_path, without_pictures):
     own = tmp_path / "own"
     own.mkdir()
-    text = (find_case("3.1") / "case.toml").read_text()
+    text = (find_case("3.1") / "case.toml").read_text().replace("step = 0.01", "step = 0.1")
     (own / "case.toml").write_text(text.replace("Two masses and", "<script>alert(1)</script> &"))
     report = run_case(own, tmp_path, realisations=2).report.read_text(encoding="utf-8")
     assert "<script>" not in report
@@ -189,7 +195,7 @@ def call(*words, cwd=None):
 
 
 def test_processes_give_what_one_gives(ran, tmp_path, without_pictures):
-    alone = run_case(find_case("3.1"), tmp_path, realisations=4).report.parent
+    alone = run_case(ran.outputs["3.1-discrete"].case.folder, tmp_path, realisations=4).report.parent
     table = "tables/identified.csv"
     assert (ran.folder / "3.1-discrete" / table).read_text() == (alone / table).read_text()
 

@@ -89,7 +89,7 @@ def test_good_virtual_points(points):
     ("factor", "said"),
     [
         (-1.0, "sign: response 102:+y moves against what is expected"),
-        (9.81, "units: response 102:+y is 9.8"),
+        pytest.param(9.81, "units: response 102:+y is 9.8", marks=pytest.mark.long),
     ],
 )
 def test_a_bad_sensor_is_one_error(points, factor, said):

@@ -9,7 +9,7 @@ from jointfrf.amplitude.friction import bouc_wen, iwan, jenkins
 AMPLITUDES = np.array([0.03, 0.4, 1.3, 6.0])
 
 
-def first_harmonic(force_of, amplitude, steps=4000, cycles=2):
+def first_harmonic(force_of, amplitude, steps=2000, cycles=2):
     """K of the last cycle of a force that follows increments of x."""
     angle = np.arange(cycles * steps) * 2 * np.pi / steps
     x = amplitude * np.cos(angle)

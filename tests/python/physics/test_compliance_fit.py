@@ -83,7 +83,7 @@ def test_reaches_the_bound_and_covers_the_truth(beams):
 
 def test_the_band_mean_is_far_from_it(beams):
     """Why the fit exists: on the same data the mean of K* is several times worse."""
-    h = jf.realisations(beams.gamma(beams.joint), 0.05, seed=5, count=40)
+    h = jf.realisations(beams.gamma(beams.joint), 0.05, seed=5, count=20)
     fits = [identified(beams.freq, one, beams.joint.dofs, damping="viscous") for one in h]
     fitted = np.array([list(fit.value.values()) for fit in fits]) / TRUTH - 1
     lines = jf.inverse_substructuring(h.reshape(-1, 4, 4)).reshape(len(h), -1, 2, 2)

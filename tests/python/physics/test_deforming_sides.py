@@ -53,7 +53,13 @@ def test_intervals_hold_the_joint_between_blocks():
     assert str(same) == str(fit)
 
 
-@pytest.mark.parametrize(("low", "high", "distance"), [(10, 600, 0.02), (100, 1500, 0.02), (10, 1000, 0.04)])
+@pytest.mark.parametrize(
+    ("low", "high", "distance"),
+    [
+        (10, 1000, 0.04),
+        *(pytest.param(*each, marks=pytest.mark.long) for each in ((10, 600, 0.02), (100, 1500, 0.02))),
+    ],
+)
 def test_bands_and_distances_of_channels_do_not_narrow_intervals_onto_a_false_value(low, high, distance):
     freq = tuple(np.arange(float(low), high + 1, 5))
     h, sides, joint = measured(freq, distance)
@@ -62,7 +68,7 @@ def test_bands_and_distances_of_channels_do_not_narrow_intervals_onto_a_false_va
     assert (abs(fit.stiffness / np.diagonal(joint.stiffness) - 1) < 0.06).all()
 
 
-@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.long)])
 def test_gains_of_hits_are_in_what_is_seen(seed):
     """Every hit has a gain of its own, 1 %: what is seen without them is inside; scatter of lines misses it."""
     freq = tuple(np.arange(10.0, 601.0, 10))

@@ -131,7 +131,10 @@ def test_reml_agrees_with_the_likelihood_integrated_over_the_mean():
     assert_allclose(np.sqrt(effects.reml[0]), trial[int(np.argmax(logs))], atol=3e-4)
 
 
-@pytest.mark.parametrize(("count", "spread", "error"), [(3, 0.1, 0.02), (6, 0.3, 0.1), (12, 0.05, 0.05)])
+@pytest.mark.parametrize(
+    ("count", "spread", "error"),
+    [(3, 0.1, 0.02), (6, 0.3, 0.1), pytest.param(12, 0.05, 0.05, marks=pytest.mark.long)],
+)
 def test_intervals_hold(count, spread, error):
     rng = np.random.default_rng(count)
     draws, inside = 150, np.zeros(3)

@@ -28,13 +28,13 @@ def test_noise_alone_is_no_finding(name, kind):
         assert jf.check_frfs(freq, h, names(s)).findings == ()
 
 
+@pytest.mark.parametrize("seed", [0, pytest.param(3, marks=pytest.mark.long)])
 @pytest.mark.parametrize("error", ERRORS)
 @pytest.mark.parametrize("name", ["3.3", "six"])
-def test_errors_are_found_with_their_channel_and_nothing_else(name, error):
-    for seed in (0, 3):
-        reported = check_with_error(structure(name), ERRORS[error], "complex", 0.02, seed)
-        assert reported.found, reported.check
-        assert reported.alone, reported.check
+def test_errors_are_found_with_their_channel_and_nothing_else(name, error, seed):
+    reported = check_with_error(structure(name), ERRORS[error], "complex", 0.02, seed)
+    assert reported.found, reported.check
+    assert reported.alone, reported.check
 
 
 def test_without_noise_nothing_is_found():

@@ -38,7 +38,7 @@ def size(h):
     return np.median(abs(h), axis=0)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 @pytest.mark.parametrize(
     ("kind", "level", "root"),
     [
@@ -61,7 +61,7 @@ def test_relative_noise(h, kind, level, root, seed):
     assert np.median(abs(noise.smooth.h - h) / (root * abs(h))) < 0.15
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_floor(h, seed):
     x = h + 0.05 * size(h) * circular(h.shape, seed)
     noise = jf.estimate_noise(FREQ, x)
@@ -69,7 +69,7 @@ def test_floor(h, seed):
     assert (noise.relative < 0.005).all()
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_mixed_noise_different_by_entry(h, seed):
     relative = np.geomspace(0.005, 0.1, 16).reshape(4, 4)
     floor = np.geomspace(0.1, 0.005, 16).reshape(4, 4) * size(h)
@@ -120,7 +120,7 @@ def garbage(h, lines, seed, *, entries=None):
     return x
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 @pytest.mark.parametrize("kind", ["both directions", "reciprocal", "rectangular"])
 @pytest.mark.parametrize("run", [1, 4, 20])
 def test_lines_that_are_noise_only_do_not_change_the_others(h, kind, run, seed):
