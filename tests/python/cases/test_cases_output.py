@@ -26,8 +26,8 @@ from jointfrf.report.table import Table, as_text, number
 from thinned_cases import DrawSome
 
 COMMAND = [sys.executable, "-m", "jointfrf"]
-#: A figure of each form: curves of several methods, mode shapes, ribbons, intervals, columns of panels.
-DRAWN = frozenset(["methods-k_Fy", "modes", "identified-c_x", "noise", "polluted"])
+#: A figure of each form: curves of several methods, mode shapes, ribbons, intervals.
+DRAWN = frozenset(["methods-k_Fy", "modes", "identified-c_x", "noise"])
 
 
 class Ran(NamedTuple):

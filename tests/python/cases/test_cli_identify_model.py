@@ -203,7 +203,8 @@ def test_wrong_words(tmp_path, monkeypatch, words, status, sentence):
     assert result.stdout == ""
 
 
-def test_laws_by_words_and_by_a_file_are_one_fit(tmp_path):
+def test_laws_by_words_and_by_a_file_are_one_fit(tmp_path, monkeypatch):
+    monkeypatch.setattr("jointfrf.report.fit.draw", DrawSome())
     words = run(*BARS, "--law", "y=spring", "--law", "theta_z=spring", "--json")
     (tmp_path / "joint.toml").write_text('dofs = ["y", "theta_z"]\nstiffness = [2e6, 2e3]\ndamping = [50.0, 0.5]\n')
     page = tmp_path / "report.html"

@@ -206,7 +206,7 @@ def test_covariance_at_the_joint_is_that_of_refits(h):
 
 
 def test_covariance_with_models_is_that_of_refits(between_points):
-    freq, measured = FREQ[::4], noisy(between_points * gains(4))[::4]
+    freq, measured = FREQ[::8], noisy(between_points * gains(4))[::8]
     problem = prepare_model_fit(freq, measured, assembly(exact=True), Channels(CHANNELS, CHANNELS), NoiseOptions(), ())
     found = fit_assembly(problem)
     errors = found.problem.noise.calibration
