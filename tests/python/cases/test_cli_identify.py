@@ -38,6 +38,7 @@ def test_the_program_prints_what_the_command_gives():
         [sys.executable, "-m", "jointfrf", *map(str, words)], capture_output=True, text=True, timeout=900
     )
     assert (started.returncode, started.stdout, started.stderr) == run_command(*words)
+    assert "\r" not in started.stdout + started.stderr  # progress is for terminals only
 
 
 @pytest.fixture(scope="module")

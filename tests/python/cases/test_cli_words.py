@@ -591,14 +591,6 @@ def test_completion_of_the_shells():
     assert done.stdout.split() == ["--band"], done.stderr
 
 
-def test_progress_is_for_terminals_only():
-    done = subprocess.run(
-        [sys.executable, "-m", "jointfrf", "identify", str(BARS), *JOINT], capture_output=True, text=True, timeout=900
-    )
-    assert done.returncode == 0
-    assert "\r" not in done.stderr + done.stdout
-
-
 def test_time_left_on_a_terminal(monkeypatch, capsys):
     from jointfrf.cli import usage
 

@@ -118,7 +118,14 @@ def test_a_prefix_stands_for_the_power_of_ten(size, unit, shown_unit):
     assert not [text for text in written if re.search(r"[e×+]", text)]  # no offset, no power
 
 
-@pytest.mark.parametrize("key", ["polluted", "noise", "identified-k_Mtheta", "sensitivity-s-Fy"])
+@pytest.mark.parametrize(
+    "key",
+    [
+        "polluted",
+        "noise",
+        *(pytest.param(key, marks=pytest.mark.long) for key in ("identified-k_Mtheta", "sensitivity-s-Fy")),
+    ],
+)
 def test_numbers_along_axes_do_not_collide(figures, key):
     drawn = texts(draw(next(figure for figure in figures if figure.key == key)).svg)
     numbers = [(x, y, text) for x, y, text in drawn if re.fullmatch(r"[−\d.]+", text)]

@@ -20,7 +20,7 @@ from fuzz.parts import PARTS, make_part
 from fuzz.python_calls import public_callables
 from fuzz.watch import Found, attack
 
-SHORT = {"calls": 250, "files": 150, "abi": 1500, "overlaps": 50, "commands": 20}
+SHORT = {"calls": 150, "files": 150, "abi": 1500, "overlaps": 50, "commands": 20}
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="processes and limits of Linux")
 
 
