@@ -206,7 +206,7 @@ def block_models(softer=1.0):
     return tuple(found)
 
 
-@pytest.mark.parametrize(("softer", "seed"), [(1.0, 1), (1.03, 2), (0.97, 3)])
+@pytest.mark.parametrize(("softer", "seed"), [(1.0, 1), (1.03, 2), pytest.param(0.97, 3, marks=pytest.mark.long)])
 def test_a_hammer_test_of_two_blocks_holds_by_models(softer, seed):
     """24 x 24 channels, 1 % noise: all stiffnesses inside, errors of at most 0.8 %."""
     freq = tuple(np.arange(10.0, 601.0, 10))
