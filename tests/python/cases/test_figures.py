@@ -123,7 +123,8 @@ def test_a_prefix_stands_for_the_power_of_ten(size, unit, shown_unit):
     [
         "polluted",
         "noise",
-        *(pytest.param(key, marks=pytest.mark.long) for key in ("identified-k_Mtheta", "sensitivity-s-Fy")),
+        "sensitivity-s-Fy",
+        pytest.param("identified-k_Mtheta", marks=pytest.mark.long),
     ],
 )
 def test_numbers_along_axes_do_not_collide(figures, key):

@@ -28,9 +28,21 @@ def test_noise_alone_is_no_finding(name, kind):
         assert jf.check_frfs(freq, h, names(s)).findings == ()
 
 
-@pytest.mark.parametrize("seed", [0, pytest.param(3, marks=pytest.mark.long)])
-@pytest.mark.parametrize("error", ERRORS)
-@pytest.mark.parametrize("name", ["3.3", "six"])
+def _marks(name, error, seed):
+    """What is wrong is drawn by the seed: of six DOFs another one shows another way to exchanged and doubled ones."""
+    is_other_way = name == "six" and error.endswith(("exchanged", "doubled"))
+    return () if seed == 0 or is_other_way else pytest.mark.long
+
+
+@pytest.mark.parametrize(
+    ("name", "error", "seed"),
+    [
+        pytest.param(name, error, seed, marks=_marks(name, error, seed))
+        for name in ("3.3", "six")
+        for error in ERRORS
+        for seed in (0, 3)
+    ],
+)
 def test_errors_are_found_with_their_channel_and_nothing_else(name, error, seed):
     reported = check_with_error(structure(name), ERRORS[error], "complex", 0.02, seed)
     assert reported.found, reported.check

@@ -156,6 +156,8 @@ def test_an_unclear_order_of_axes_must_be_said():
     arguments = {"responses": channels, "excitations": channels, "quantity": "receptance", "unit": "m/N"}
     with pytest.raises(FileContentError, match="is frequency is not clear from the sizes: give axes="):
         frfs_of_arrays([1, 2, 3], h, axes="", **arguments)
+    with pytest.raises(ValueError, match="axes 'freq,out' are not freq, out and in, in their order"):
+        frfs_of_arrays([1, 2, 3], h, axes="freq,out", **arguments)
     np.testing.assert_array_equal(frfs_of_arrays([1, 2, 3], h, axes="out,in,freq", **arguments).h[0], h[:, :, 0])
 
 

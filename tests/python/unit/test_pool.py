@@ -138,6 +138,8 @@ def test_one_joint_explains_two_structures_where_it_does():
     assert "no one joint explains all" in str(other)
     assert_allclose(same.statistic, (np.log(1.005) ** 2 + np.log(20.1 / 20) ** 2) / (2 * 0.01**2), rtol=1e-9)
     assert jf.transfer([fit_of(1.000e6, 20.0), fit_of(1.100e6, 20.1)], spread=0.1).p_value > 0.5
+    with pytest.raises(ValueError, match="spread must be a relative standard deviation, zero or more"):
+        jf.transfer([fit_of(1.000e6, 20.0), fit_of(1.100e6, 20.1)], spread=-0.1)
 
 
 def test_the_statistic_of_a_transfer_is_chi_squared():

@@ -5,7 +5,8 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import CancelledError, ProcessPoolExecutor, wait
+from collections import deque
+from concurrent.futures import CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from threading import Event, Lock, Thread
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.cases.workers import RankedProcesses, started_workers
+from jointfrf.cases.workers import RankedProcesses, Workers, started_workers
 from jointfrf.parallel.pool import can_start_processes, opened_pool, started_processes
 
 _PARENT = """
@@ -211,3 +212,12 @@ def test_a_thread_that_waits_for_processes_lets_another_compute(tmp_path):
 def test_what_is_begun_is_there_when_it_is_asked_for(jobs):
     with started_workers(jobs) as workers:
         assert [one() for one in [workers.begin(divmod, i, 3) for i in range(4)]] == [(0, 0), (0, 1), (0, 2), (1, 0)]
+
+
+def test_what_nobody_waits_for_any_longer_is_not_computed():
+    futures = [Future() for _ in range(3)]
+    futures[0].set_result(1)
+    results = Workers()._results(deque(futures))
+    assert next(results) == 1
+    results.close()
+    assert [one.cancelled() for one in futures] == [False, True, True]

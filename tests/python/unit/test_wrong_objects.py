@@ -34,6 +34,7 @@ def chain():
 
 
 SPRING = jf.SpringLaw(1e3)
+CHANNEL = jf.io.Channel(1, "+x")
 BRICK = jf.Mesh(np.eye(8, 3), np.arange(8)[None])
 STEEL = jf.Material(210e9, 0.3, 7850.0)
 FREQUENCIES = np.linspace(1.0, 9.0, 9)
@@ -159,6 +160,13 @@ def realised(**options):
         (lambda: jf.check_frfs(FREQUENCIES, np.ones((9, 1, 1)), names="x"), "names must be a sequence of names, not"),
         (lambda: jf.Joint([1.0], dofs=["x"]).export("ansys", {1: 2}), "nodes must be two different nodes, not"),
         (lambda: jf.Joint([1.0], dofs=["x"]).export("ansys", {"x": 1, 3: 2}), "nodes must be a list of node numbers"),
+        (lambda: jf.assemble(chain(), chain(), 1e3, [1], [0]), "joint must be a Joint or a LawJoint, not float"),
+        (lambda: jf.levels(3, [jf.Drive("force", 1.0)]), "fits must be a sequence of Fit"),
+        (lambda: jf.write_plan(3, "plan.html"), "plan must be a MeasurementPlan or a JointFrfPlan, not int"),
+        (
+            lambda: jf.io.FrfSet([1.0], [CHANNEL], [CHANNEL], np.ones((1, 1, 1)), "receptance").matrix(3, [CHANNEL]),
+            "outputs must be a sequence of channels, not int",
+        ),
     ],
 )  # fmt: skip
 def test_one_sentence_of_our_own(call, message):
