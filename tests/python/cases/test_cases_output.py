@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageColor
 
 import jointfrf as jf
 from command import Finished, run_command
@@ -20,7 +20,7 @@ from jointfrf.cases.known_joint.figures import build_figures
 from jointfrf.cli.main import main
 from jointfrf.dofs import Parameter
 from jointfrf.report.axes import symbol
-from jointfrf.report.draw import draw
+from jointfrf.report.draw import STYLES, draw
 from jointfrf.report.figure import Curve, Figure, Interval, Panel, figure_csv
 from jointfrf.report.table import Table, as_text, number
 from thinned_cases import DrawSome
@@ -86,21 +86,23 @@ FIGURES = {
 }
 
 
-def check_picture(png):
+def check_picture(figure, png):
     with Image.open(io.BytesIO(png)) as image:
         assert image.format == "PNG"
         assert image.width == 910
         # More than an empty frame: many shades, and mostly paper.
-        shades = np.asarray(image.convert("L"))
+        shades, colours = np.asarray(image.convert("L")), np.asarray(image.convert("RGB"), int)
     assert 0.5 < (shades > 200).mean() < 0.999
     assert len(np.unique(shades)) > 30
+    for style in {curve.style for panel in figure.panels for curve in panel.curves}:
+        assert (abs(colours - ImageColor.getrgb(STYLES[style].colour)).max(axis=2) < 48).any(), style
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("which", FIGURES)
 def test_every_figure_is_drawn(outputs, which):
     for figure in outputs[which].figures:
-        check_picture(draw(figure).png)
+        check_picture(figure, draw(figure).png)
 
 
 @pytest.mark.parametrize("which", FIGURES)
@@ -111,7 +113,7 @@ def test_figures_of_the_source_are_drawn(outputs, which):
     assert len(DRAWN & {figure.key for figure in figures.values()}) >= 1
     for figure in figures.values():
         if figure.key in DRAWN:
-            check_picture((folder / f"{figure.key}.png").read_bytes())
+            check_picture(figure, (folder / f"{figure.key}.png").read_bytes())
         rows = list(csv.DictReader(io.StringIO((folder / f"{figure.key}.csv").read_text())))
         points = sum(curve.x.size for panel in figure.panels for curve in panel.curves)
         assert len(rows) >= points
