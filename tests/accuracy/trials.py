@@ -245,8 +245,12 @@ def _trials() -> dict[str, list[Trial]]:
         Trial("3.3", "complex", level, damping=damping, kind=kind)
         for level in (0.01, 0.05)
         for damping, kind in (
-            ("viscous", "free"), ("none", "free, undamped"), ("auto", "free"), ("auto", "pin"), ("none", "pin, undamped"),
-        )  # fmt: skip
+            ("viscous", "free"),
+            ("none", "free, undamped"),
+            ("auto", "free"),
+            ("auto", "pin"),
+            ("none", "pin, undamped"),
+        )
     ]
     return {
         "bound": [

@@ -180,7 +180,7 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
     content = {
         "sources": [str(path) for path in args.files],
         "channels": {"responses": measured.channels[0], "forces": measured.channels[1], "unused": measured.unused},
-        "fits": [fit_to_dict(fit, lines=False)],
+        "fits": [fit_to_dict(fit, lines=False)] if args.json else [],
         "cards": text or None,
     }
     return fit, content, written

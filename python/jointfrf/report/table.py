@@ -6,6 +6,7 @@ import csv
 import io
 import re
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -194,8 +195,12 @@ def csv_cell(cell: object) -> object:
     """
     if cell is None:
         return ""
-    if not isinstance(cell, str):
-        return cell
+    return _csv_text(cell) if isinstance(cell, str) else cell
+
+
+@lru_cache(1000)
+def _csv_text(cell: str) -> str:
+    """Return a text of a cell: a curve has its name on every line."""
     text = visible(cell)
     return f"'{text}" if text.lstrip()[:1] in _FORMULA and not _NUMBERS.fullmatch(text) else text
 
