@@ -293,17 +293,16 @@ def _effects(
 
     Shapes (number, 2, n_parts, n_functions, p) and (2, n_parts, n_functions).
     """
-    by_part = errors.functions(freq_hz)[:, None] * group.band_parts[:, None]
-    n_parts, n_functions, n_freq = by_part.shape[1:]
-    by_part, p = by_part.reshape(2, -1, n_freq), group.x.size
-    found: dict[ErrorKind, Effects] = {}
+    functions, member, p = errors.functions(freq_hz), group.band_parts, group.x.size
+    shape, found = (2, len(member), functions.shape[1]), dict[ErrorKind, Effects]()
     for kind, *_ in errors.kinds():
         some = []
-        for own in line_slices(n_freq):
+        for own in line_slices(len(freq_hz)):
             changes = _unit_errors(frfs.on_lines(own), group.dofs, errors, kind)
-            some.append(effects_by_function(effects_of(group, changes, own), by_part[:, :, own], np.eye(p)))
+            by_part = (functions[:, None, :, own] * member[:, None, own]).reshape(2, shape[1] * shape[2], -1)
+            some.append(effects_by_function(effects_of(group, changes, own), by_part, np.eye(p)))
         steps, squares = (np.sum(parts, axis=0) for parts in zip(*some, strict=True))
-        found[kind] = Effects(steps.reshape(-1, 2, n_parts, n_functions, p), squares.reshape(2, n_parts, n_functions))
+        found[kind] = Effects(steps.reshape(-1, *shape, p), squares.reshape(shape))
     return found
 
 
