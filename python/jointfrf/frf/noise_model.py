@@ -37,8 +37,6 @@ _MOST_TAKEN = 0.8
 _MOST_TURNS = 4
 _SETTLED = 1.5
 _SETTLED_SHARE = 0.97
-#: The residual about smooth FRFs with the poles of others is this many times their noise at most.
-_LIKE = 1.2
 #: Differences that are so many times smaller than measured minus smooth do not contain the noise of driving points.
 _UNSEEN = 3.0
 #: Parts of the noise by entry and its variation over frequency are found in turn so often at most.
@@ -368,7 +366,7 @@ def _begun_like(
         return None
     variance = lines.weighing(near)
     smooth = lines.smoothed(variance, like.inflation, 0, like.smooth.poles)
-    return (smooth, variance, like.inflation) if smooth.is_smooth and smooth.level < _LIKE else None
+    return (smooth, variance, like.inflation) if smooth.is_like(1.0) else None
 
 
 def _first_smooth(

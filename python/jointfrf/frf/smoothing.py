@@ -33,12 +33,15 @@ __all__ = [
     "pieces",
     "smooth_frfs",
     "smoothed",
+    "smoothed_in_pieces",
 ]
 
 #: Fewer lines are returned as measured: a pole and its residues take three of them.
 _FEWEST_LINES = 16
 #: A residual below this share of the FRFs is an error of the rational functions rather than noise.
 _EXACT = 1e-4
+#: The residual about smooth FRFs with the poles of others is this many times their noise at most.
+_LIKE = 1.2
 #: Share of the median of |h|^2 that first weights add to |h|^2: a floor of 30 % of the median of |h|.
 _FIRST_FLOOR = 0.09
 
@@ -76,6 +79,10 @@ class SmoothFrfs:
     def order(self) -> int:
         """Number of poles of the group that has most."""
         return max((len(poles) for poles in self.poles), default=0)
+
+    def is_like(self, level: float) -> bool:
+        """Whether these FRFs, with the poles of others, leave no more than noise of the level of the others."""
+        return self.is_smooth and self.level < _LIKE * level
 
 
 def smooth_frfs(
@@ -143,18 +150,32 @@ def smooth_frfs(
     if as_integer("max_poles", max_poles) < 1:
         raise ValueError(f"max_poles must be 1 or more, not {max_poles}")
     search = OrderSearch(inflation=inflation, max_poles=max_poles)
+    return smoothed_in_pieces(freq, lines, spread, search, reciprocal=reciprocal)
+
+
+def smoothed_in_pieces(
+    freq: FloatArray,
+    h: ComplexArray,
+    variance: FloatArray | None,
+    search: OrderSearch,
+    *,
+    reciprocal: bool,
+    start: tuple[ComplexArray, ...] = (),
+) -> SmoothFrfs:
+    """Smooth checked FRFs, lines in any order, as `smooth_frfs` does; from poles `start` if there is one piece."""
     places = pieces(np.argsort(freq))
     parts = (
         smoothed(
             freq[own],
-            lines[own],
-            None if spread is None else spread[own],
+            h[own],
+            None if variance is None else variance[own],
             search,
-            entry_groups(lines[own], reciprocal=reciprocal),
+            entry_groups(h[own], reciprocal=reciprocal),
+            start if len(places) == 1 else (),
         )
         for own in places
     )
-    return joined(places, parts, lines.shape)
+    return joined(places, parts, h.shape)
 
 
 def pieces(order: NDArray[np.intp]) -> list[NDArray[np.intp]]:

@@ -14,8 +14,9 @@ from jointfrf.frf.entry_groups import ZERO, entry_groups
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.frf.noise_parts import noise_parts
 from jointfrf.frf.quantiles import medians
+from jointfrf.frf.rational_fit import OrderSearch
 from jointfrf.frf.setups import SetUps
-from jointfrf.frf.smoothing import near_squares, smooth_frfs
+from jointfrf.frf.smoothing import SmoothFrfs, near_squares, smoothed_in_pieces
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_real, check_type
 
 __all__ = ["KnownNoise", "NoiseOptions", "SmoothedFrfs", "noise_about", "noise_of_channels", "noise_of_matrix"]
@@ -40,7 +41,7 @@ class NoiseOptions:
     noise: float | ArrayLike | None = None
     coherence: ArrayLike | None = None
     averages: float | None = None
-    like: NoiseModel | None = None
+    like: NoiseModel | SmoothFrfs | None = None
     setups: SetUps | None = None
 
     def on_lines(self, kept: NDArray[np.bool_], shape: tuple[int, ...]) -> NoiseOptions:
@@ -100,6 +101,8 @@ class KnownNoise:
         Noise of the channels, where it was found from their FRFs; not of long sweeps.
     is_given : bool
         Whether the user gave the noise.
+    smooth : SmoothFrfs, optional
+        By noise that the user gave; not of long sweeps.
     calibration : CalibrationErrors, optional
         Errors of the FRFs that are smooth over frequency, where h_pq and h_qp show any.
     """
@@ -110,7 +113,13 @@ class KnownNoise:
     outlying: NDArray[np.intp]
     model: NoiseModel | None = None
     is_given: bool = False
+    smooth: SmoothFrfs | None = None
     calibration: CalibrationErrors | None = None
+
+    @property
+    def like(self) -> NoiseModel | SmoothFrfs | None:
+        """What other realisations start from."""
+        return self.model or self.smooth
 
     @classmethod
     def given(cls, level: float, calibration: CalibrationErrors | None = None) -> KnownNoise:
@@ -148,24 +157,25 @@ def noise_of_matrix(freq: FloatArray, h: ComplexArray, options: NoiseOptions, *,
     # What is found below takes off what set-ups differ by as errors of channels, but does not know it as theirs.
     is_apart = options.noise is not None or options.setups is not None
     calibration = options.calibration(freq, h, reciprocal=reciprocal) if is_apart else None
+    like = options.like.smooth if isinstance(options.like, NoiseModel) else options.like
     if level is not None:
-        variance = _relative_variance(np.sqrt(near_squares(h)), level)
-        # Measured FRFs as weights favour lines that noise has made small.
-        variance = _relative_variance(smooth_frfs(freq, h, variance, reciprocal=reciprocal).h, level)
-        smooth = smooth_frfs(freq, h, variance, reciprocal=reciprocal).h
-        variance, known = _relative_variance(smooth, level), KnownNoise.given(level, calibration)
+        found = _smooth_at_level(freq, h, level, like, reciprocal=reciprocal)
+        known = replace(KnownNoise.given(level, calibration), smooth=found)
+        variance = _relative_variance(found.h, level)
     elif options.noise is not None:
         variance = options.variance(h.shape, np.ones(h.shape[1:], bool))
         of_entry = np.median(np.sqrt(variance) / np.maximum(abs(h), _TINY), axis=0)
         # Entries that are zero by symmetry have noise, but no relative noise.
         usual = float(np.median(of_entry[of_entry < 1] if (of_entry < 1).any() else of_entry))
-        known = KnownNoise.given(usual, calibration)
-        smooth = smooth_frfs(freq, h, variance, reciprocal=reciprocal).h
+        begun = _smooth_like(freq, h, variance, like, reciprocal=reciprocal)
+        found = begun or smoothed_in_pieces(freq, h, variance, OrderSearch(), reciprocal=reciprocal)
+        known = replace(KnownNoise.given(usual, calibration), smooth=found)
     else:
         model = estimate_noise(
-            freq, h, reciprocal=reciprocal, coherence=options.coherence, averages=options.averages, like=options.like
-        )
-        known = KnownNoise.found(model)
+            freq, h, reciprocal=reciprocal, coherence=options.coherence, averages=options.averages,
+            like=options.like if isinstance(options.like, NoiseModel) else None,
+        )  # fmt: skip
+        known, found = KnownNoise.found(model), model.smooth
         if options.setups is not None:
             known = replace(known, calibration=calibration)
         if model.source == "residual" and not model.smooth.is_smooth:
@@ -174,13 +184,39 @@ def noise_of_matrix(freq: FloatArray, h: ComplexArray, options: NoiseOptions, *,
         variance = _relative_variance(model.smooth.h, _ASSUMED_LEVEL if known.is_assumed else _LEAST_LEVEL)
         if not known.is_assumed:
             np.maximum(model.variance, variance, out=variance)
-        # Other realisations start from the model; of a long sweep it would take too much memory.
-        if is_long(len(freq)):
-            known, smooth = replace(known, model=None), model.smooth.h
-        else:
-            smooth = model.smooth.h.copy()
         del model
+    # Other realisations start from these; of a long sweep they would take too much memory.
+    if is_long(len(freq)):
+        known, smooth = replace(known, model=None, smooth=None), found.h
+    else:
+        smooth = found.h.copy()
     return SmoothedFrfs(_near(smooth, h, variance), variance, known)
+
+
+def _smooth_at_level(
+    freq: FloatArray, h: ComplexArray, level: float, like: SmoothFrfs | None, *, reciprocal: bool
+) -> SmoothFrfs:
+    """Return smooth FRFs, weighted by noise of a level relative to them."""
+    if like is not None and np.array_equal(like.freq_hz, freq) and like.h.shape == h.shape:
+        begun = _smooth_like(freq, h, _relative_variance(like.h, level), like, reciprocal=reciprocal)
+        if begun is not None:
+            return begun
+    # Measured FRFs as weights favour lines that noise has made small.
+    variance = _relative_variance(np.sqrt(near_squares(h)), level)
+    first = smoothed_in_pieces(freq, h, variance, OrderSearch(), reciprocal=reciprocal)
+    variance = _relative_variance(first.h, level)
+    return smoothed_in_pieces(freq, h, variance, OrderSearch(), reciprocal=reciprocal, start=first.poles)
+
+
+def _smooth_like(
+    freq: FloatArray, h: ComplexArray, variance: FloatArray, like: SmoothFrfs | None, *, reciprocal: bool
+) -> SmoothFrfs | None:
+    """Return smooth FRFs with the poles of others, relocated; None where these leave more than of the others."""
+    if like is None or not like.is_smooth:
+        return None
+    search = OrderSearch(patience=0)
+    found = smoothed_in_pieces(freq, h, variance, search, reciprocal=reciprocal, start=like.poles)
+    return found if found.is_like(like.level) else None
 
 
 def noise_of_channels(

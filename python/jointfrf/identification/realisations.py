@@ -159,7 +159,7 @@ def identify_realisations(
         problem = replace(prepare_compliance(measured, dofs, bands, transform, known, options), near=near or ())
         found = fit_springs(problem)
         if near is None:
-            near, known = found.estimate.starts, replace(known, like=problem.noise.model)
+            near, known = found.estimate.starts, replace(known, like=problem.noise.like)
         yield describe_springs(found, problem)
 
 

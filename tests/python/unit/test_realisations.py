@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
+from jointfrf.frf import rational_fit
 from jointfrf.identification.realisations import viscous_estimate
 
 
@@ -12,10 +13,17 @@ def drawn(beams):
     return list(jf.realisations(beams.gamma(beams.joint), 0.02, seed=5, count=4))
 
 
-def test_each_fit_is_that_of_identify(beams, drawn):
-    fits = list(jf.identify_realisations(beams.freq, drawn, ["y", "theta"], damping="viscous"))
+@pytest.fixture(params=["found", "level", "variances"])
+def noise(request, beams):
+    """What is said of the noise."""
+    known = {"found": None, "level": 0.02, "variances": (0.02 * abs(beams.gamma(beams.joint))) ** 2}
+    return known[request.param]
+
+
+def test_each_fit_is_that_of_identify(beams, drawn, noise):
+    fits = list(jf.identify_realisations(beams.freq, drawn, ["y", "theta"], damping="viscous", noise=noise))
     for fit, gamma in zip(fits, drawn, strict=True):
-        alone = jf.identify(beams.freq, gamma, ["y", "theta"], damping="viscous")
+        alone = jf.identify(beams.freq, gamma, ["y", "theta"], damping="viscous", noise=noise)
         for name, value in alone.value.items():
             # The smooth FRFs of both differ by a small part of the noise.
             assert abs(fit.value[name] - value) < 0.1 * alone.std_error[name]
@@ -23,11 +31,26 @@ def test_each_fit_is_that_of_identify(beams, drawn):
         assert fit.noise_level == pytest.approx(alone.noise_level, rel=0.05)
 
 
-def test_a_set_of_another_structure_is_searched_anew(beams, chains, drawn):
+@pytest.mark.parametrize("factor", [1, 0.25])
+def test_poles_of_smooth_frfs_are_those_of_the_first_set_relocated(beams, drawn, noise, factor, monkeypatch):
+    """Whatever is said of the size of the noise."""
+    searches = []
+    first_poles = rational_fit.first_poles
+    monkeypatch.setattr(rational_fit, "first_poles", lambda entries: searches.append(1) or first_poles(entries))
+    known = None if noise is None else noise * factor
+    fits = jf.identify_realisations(beams.freq, drawn, ["y", "theta"], damping="viscous", noise=known)
+    next(fits)
+    assert len(searches) == 1
+    assert len(list(fits)) == 3
+    assert len(searches) == 1
+
+
+def test_a_set_of_another_structure_is_searched_anew(beams, drawn, noise):
     other = beams.gamma(jf.Joint([1e5, 1e3], [5, 0.5], ["y", "theta"]))
+    known = (0.02 * abs(other)) ** 2 if np.ndim(noise) else noise
     sets = [drawn[0], jf.pollute(other, 0.02, seed=1)]
-    _, fit = jf.identify_realisations(beams.freq, sets, ["y", "theta"], damping="viscous")
-    alone = jf.identify(beams.freq, sets[1], ["y", "theta"], damping="viscous")
+    _, fit = jf.identify_realisations(beams.freq, sets, ["y", "theta"], damping="viscous", noise=known)
+    alone = jf.identify(beams.freq, sets[1], ["y", "theta"], damping="viscous", noise=known)
     assert fit.noise_level == pytest.approx(alone.noise_level, rel=0.05)
     for name, value in alone.value.items():
         assert abs(fit.value[name] - value) < 0.1 * alone.std_error[name]
