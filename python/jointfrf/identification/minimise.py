@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from jointfrf.kernel.arguments import TINY, FloatArray
 
-__all__ = ["Linearised", "Minimum", "Squares", "inverse_information", "minimise"]
+__all__ = ["Linearised", "Minimum", "Squares", "full_step", "inverse_information", "minimise"]
 
 #: Levenberg's parameter: first value, factors where a step succeeds and fails, smallest and largest value.
 _FIRST, _LOWERED, _RAISED, _SMALLEST, _LARGEST = 1e-3, 0.1, 8.0, 1e-9, 1e9
@@ -114,8 +114,7 @@ def minimise(
     for _ in range(steps):
         if not np.isfinite(at.information).all():
             break
-        pressed = ((x <= lower) & (at.gradient < 0)) | ((x >= upper) & (at.gradient > 0))
-        way = _Steps(at, np.flatnonzero(free & ~pressed))
+        way = _Steps(at, np.flatnonzero(free & _can_move(at, x, squares.bounds)))
         promised = way.step(0.0)[1]
         if promised < least:
             converged = True
@@ -142,6 +141,18 @@ def minimise(
             converged = True
             break
     return Minimum(x, at.cost, at.information, at.gradient, converged, (x <= lower) | (x >= upper))
+
+
+def full_step(at: Linearised, x: FloatArray, bounds: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, float]:
+    """Return the minimum of squares by their derivatives at a point, and by how much it promises to be lower."""
+    step, promised = _Steps(at, np.flatnonzero(_can_move(at, x, bounds))).step(0.0)
+    return np.clip(x + step, *bounds), promised
+
+
+def _can_move(at: Linearised, x: FloatArray, bounds: tuple[FloatArray, FloatArray]) -> NDArray[np.bool_]:
+    """Whether coordinates are not at a bound that the squares press them against."""
+    lower, upper = bounds
+    return ~(((x <= lower) & (at.gradient < 0)) | ((x >= upper) & (at.gradient > 0)))
 
 
 class _Steps:

@@ -11,6 +11,8 @@ from scipy import sparse
 import jointfrf as jf
 from jointfrf.cases.known_joint.decoupling import decoupling_bound, fit_decoupling
 from jointfrf.identification.line_starts import from_lines
+from jointfrf.identification.model import realisations
+from jointfrf.identification.model.fit import fit_assembly
 from jointfrf.identification.model.prediction import Prediction, parameter_vector
 from jointfrf.identification.model.prepare import Channels, prepare_model_fit
 from jointfrf.identification.model.reduced import MatrixPolynomial
@@ -561,11 +563,14 @@ def test_realisations_of_noise_of_two_parts_are_those_of_single_fits():
             assert abs(value - fit.value[name]) < 0.03 * fit.std_error[name]
 
 
-def test_a_realisation_unlike_the_first_is_fitted_by_itself():
+def test_a_realisation_unlike_the_first_is_fitted_by_itself(monkeypatch):
     """Noise three times that of the first set, then the first once more."""
     freq, sides, k_joint, exact, measured = decoupling_data(0.02, 2)
     loud = jf.pollute(np.ascontiguousarray(exact), 0.06, seed=9)
+    searched = []
+    monkeypatch.setattr(realisations, "fit_assembly", lambda problem: searched.append(problem) or fit_assembly(problem))
     first, other, last = fit_decoupling(freq, ("x",), sides, k_joint, np.stack([measured[0], loud, measured[0]]))
+    assert all(np.array_equal(problem.measured, h) for problem, h in zip(searched, [measured[0], loud], strict=True))
     assert abs(other[0] / 2000 - 1) < 0.02
     assert np.allclose(first, last, rtol=1e-3)
 

@@ -78,8 +78,11 @@ class WeightedResiduals(ABC):
 
     def linearised(self, x: FloatArray) -> Linearised:
         """Return the squares with information and gradient."""
+        return self.about(x, *self.prediction.linearised(self.vector, self.vector.to_values(x)))
+
+    def about(self, x: FloatArray, y: ComplexArray, slopes: ComplexArray) -> Linearised:
+        """Return the same by the prediction and its derivatives, which may be changed."""
         vector = self.vector
-        y, slopes = self.prediction.linearised(vector, vector.to_values(x))
         residual = np.ascontiguousarray(self.weighted(self.difference(y)).ravel())
         slopes = np.ascontiguousarray(self.weigh_slopes(y, slopes))
         pulls, of_pulls, by_x = vector.pulls(x), vector.pull_slopes(x), vector.slope(x)
