@@ -163,7 +163,9 @@ def identify_realisations(
         yield describe_springs(found, problem)
 
 
-def viscous_joints(freq_hz: FloatArray, gammas: Iterable[ComplexArray], dofs: Sequence[str]) -> FloatArray:
+def viscous_joints(
+    freq_hz: FloatArray, gammas: Iterable[ComplexArray], dofs: Sequence[str], start: FitStart | None = None
+) -> FloatArray:
     """Return stiffness and viscous damping of several sets as `identify_realisations` gives them, and nothing else.
 
     Parameters
@@ -174,6 +176,7 @@ def viscous_joints(freq_hz: FloatArray, gammas: Iterable[ComplexArray], dofs: Se
         Measured receptances of the same structure, m/N.
     dofs : sequence of str
         Names of the n joint DOFs.
+    start : FitStart, optional
 
     Returns
     -------
@@ -185,7 +188,6 @@ def viscous_joints(freq_hz: FloatArray, gammas: Iterable[ComplexArray], dofs: Se
     ValueError
         As `identify`.
     """
-    start: FitStart | None = None
     values = []
     for gamma in gammas:
         problem = _viscous_problem(freq_hz, gamma, dofs, start)

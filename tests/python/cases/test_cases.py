@@ -517,6 +517,19 @@ def test_a_realisation_depends_on_its_number_only():
         assert len(np.unique(b.theta[:, 0])) == 5
 
 
+def test_fits_of_a_realisation_do_not_depend_on_those_computed_with_it(monkeypatch):
+    case = read_case(find_case("3.3.1-decoupling"))
+    methods = ("compliance", "decoupling-fit")
+    case = dataclasses.replace(
+        case, freq_hz=case.freq_hz[::4], noises=(structs.replace(case.noises[0], methods=methods),)
+    )
+    exact = exact_frfs(case)
+    together = estimate_realisations(case, exact, 3)
+    monkeypatch.setattr("jointfrf.cases.known_joint.realisations.chunk_size", lambda n_freq, entries: 1)
+    for a, b in zip(together, estimate_realisations(case, exact, 3), strict=True):
+        np.testing.assert_array_equal(a.theta, b.theta)
+
+
 def test_published_values_are_ranked_among_the_realisations(results):
     result = results["3.1-discrete"]
     theta = next(f.theta for f in result.identified if f.method == "ismm")

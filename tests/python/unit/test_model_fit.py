@@ -9,7 +9,7 @@ import pytest
 from scipy import sparse
 
 import jointfrf as jf
-from jointfrf.cases.known_joint.decoupling import decoupling_bound, fit_decoupling
+from jointfrf.cases.known_joint.decoupling import decoupling_bound, decoupling_fits, fit_decoupling
 from jointfrf.identification.line_starts import from_lines
 from jointfrf.identification.model import realisations
 from jointfrf.identification.model.fit import fit_assembly
@@ -541,7 +541,7 @@ def decoupling_data(level, count):
 
 def test_realisations_of_a_decoupling_fit_are_those_of_single_fits():
     freq, sides, k_joint, _, measured = decoupling_data(0.05, 4)
-    many = fit_decoupling(freq, ("x",), sides, 0.2 * k_joint, measured)
+    many = fit_decoupling(decoupling_fits(freq, ("x",), sides, 0.2 * k_joint, measured), measured)
     for found, h in zip(many, measured, strict=True):
         parts = [jf.Substructure.of_frfs(freq, own, ["j", "i"], ["j"]) for own in sides]
         fit = fit_of(freq, h, jf.Assembly(*parts, jf.Joint([500.0], [1.0], ["x"])), ["A/i", "B/i"], ["A/i", "B/i"])
@@ -555,7 +555,7 @@ def test_realisations_of_noise_of_two_parts_are_those_of_single_fits():
     measured = measured + (
         jf.realisations(np.ascontiguousarray(exact), 0.01, seed=7, count=4, relative_to="spectrum") - exact
     )
-    many = fit_decoupling(freq, ("x",), sides, 0.2 * k_joint, measured)
+    many = fit_decoupling(decoupling_fits(freq, ("x",), sides, 0.2 * k_joint, measured), measured)
     for found, h in zip(many, measured, strict=True):
         parts = [jf.Substructure.of_frfs(freq, own, ["j", "i"], ["j"]) for own in sides]
         fit = fit_of(freq, h, jf.Assembly(*parts, jf.Joint([500.0], [1.0], ["x"])), ["A/i", "B/i"], ["A/i", "B/i"])
@@ -569,10 +569,11 @@ def test_a_realisation_unlike_the_first_is_fitted_by_itself(monkeypatch):
     loud = jf.pollute(np.ascontiguousarray(exact), 0.06, seed=9)
     searched = []
     monkeypatch.setattr(realisations, "fit_assembly", lambda problem: searched.append(problem) or fit_assembly(problem))
-    first, other, last = fit_decoupling(freq, ("x",), sides, k_joint, np.stack([measured[0], loud, measured[0]]))
+    fits = decoupling_fits(freq, ("x",), sides, k_joint, measured)
+    first, other, last = fit_decoupling(fits, [measured[0], loud, measured[0]])
     assert all(np.array_equal(problem.measured, h) for problem, h in zip(searched, [measured[0], loud], strict=True))
     assert abs(other[0] / 2000 - 1) < 0.02
-    assert np.allclose(first, last, rtol=1e-3)
+    np.testing.assert_array_equal(first, last)
 
 
 def test_the_bound_of_a_decoupling_fit_is_that_of_differences():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from jointfrf.cases.known_joint.exact import Exact, measured
@@ -12,23 +14,23 @@ from jointfrf.identification.model.assembly import Assembly
 from jointfrf.identification.model.likelihood import Likelihood
 from jointfrf.identification.model.prediction import Prediction, parameter_vector
 from jointfrf.identification.model.prepare import Channels
-from jointfrf.identification.model.realisations import joints_of_realisations
+from jointfrf.identification.model.realisations import RealisationFits
 from jointfrf.identification.model.substructure import Substructure
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
 
-__all__ = ["decoupling_bound", "decoupling_bounds", "fit_decoupling"]
+__all__ = ["decoupling_bound", "decoupling_bounds", "decoupling_fits", "fit_decoupling"]
 
 
-def fit_decoupling(
+def decoupling_fits(
     freq_hz: FloatArray,
     dofs: tuple[str, ...],
     substructures: tuple[ComplexArray, ComplexArray],
     k_initial: ComplexArray,
-    measured: ComplexArray,
-) -> FloatArray:
-    """Fit stiffness and viscous damping to all FRFs between internal points, given those of the substructures.
+    first: Iterable[ComplexArray],
+) -> RealisationFits:
+    """Return fits of stiffness and viscous damping to FRFs between internal points, given those of the substructures.
 
     Parameters
     ----------
@@ -40,21 +42,21 @@ def fit_decoupling(
         Receptances of A at j, then r, and of B at k, then s, m/N.
     k_initial : ndarray, shape (n_freq, n, n)
         First estimate of K*, N/m.
-    measured : ndarray, shape (r, n_freq, 2 n, 2 n)
-        Several sets of receptances of the assembly at r, then s, m/N.
-
-    Returns
-    -------
-    ndarray, shape (r, 2 n)
-        Stiffness of all DOFs, then damping.
+    first : iterable of ndarray, shape (n_freq, 2 n, 2 n)
+        Sets of receptances of the assembly at r, then s, m/N, fitted without initial values until one fits: there all
+        others start.
 
     Notes
     -----
-    What (2.53)-(2.56) take one block each is one maximum-likelihood fit of all four. The first set is fitted without
-    initial values, the others start from its result.
+    What (2.53)-(2.56) take one block each is one maximum-likelihood fit of all four.
     """
     whole, channels = _decoupled(freq_hz, dofs, substructures, k_initial)
-    found = [one.constant_joint() for one in joints_of_realisations(freq_hz, measured, whole, channels)]
+    return RealisationFits(freq_hz, whole, channels, first)
+
+
+def fit_decoupling(fits: RealisationFits, measured: Iterable[ComplexArray]) -> FloatArray:
+    """Return stiffness of all DOFs, then damping, of several sets of such receptances, shape (r, 2 n)."""
+    found = [fits.joint(h).constant_joint() for h in measured]
     return np.array([[*joint.stiffness.diagonal(), *joint.damping.diagonal()] for joint in found])
 
 
@@ -78,12 +80,12 @@ def decoupling_bound(
     k_joint: ComplexArray,
     variance: FloatArray,
 ) -> FloatArray:
-    """Return the Cramer-Rao bound of `fit_decoupling`: relative standard deviations, shape (2 n,).
+    """Return the Cramer-Rao bound of `decoupling_fits`: relative standard deviations, shape (2 n,).
 
     Parameters
     ----------
     freq_hz, dofs, substructures
-        As of `fit_decoupling`.
+        As of `decoupling_fits`.
     k_joint : ndarray, shape (n_freq, n, n)
         The actual K* of springs and dashpots, N/m.
     variance : ndarray, shape (n_freq, 2 n, 2 n)

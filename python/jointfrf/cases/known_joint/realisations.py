@@ -22,7 +22,7 @@ from jointfrf.cases.kind import (
     StudyChoice,
     chosen_noises,
 )
-from jointfrf.cases.known_joint.decoupling import fit_decoupling
+from jointfrf.cases.known_joint.decoupling import decoupling_fits, fit_decoupling
 from jointfrf.cases.known_joint.exact import (
     SHORT_FORM,
     Exact,
@@ -39,6 +39,7 @@ from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.bands import in_bands
 from jointfrf.frf.noise import NOISE_KINDS
 from jointfrf.identification.information_bound import least_std_errors
+from jointfrf.identification.model.realisations import RealisationFits
 from jointfrf.identification.realisations import FitStart, viscous_estimate, viscous_joints
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.spelling import did_you_mean
@@ -107,18 +108,15 @@ class _ChunkResult(NamedTuple):
 def _identify(chunk: _Chunk) -> _ChunkResult:
     exact, method = chunk.exact, chunk.method
     seed = chunk.seed + noise_stream(method)
-    h = chunk.noise.realisations(chunk.measured, seed, chunk.first, chunk.count)
+    frfs = NoisyFrfs(chunk.measured, chunk.noise, seed)
     with warnings.catch_warnings():
         # Noise makes any line ill-conditioned now and then.
         warnings.simplefilter("ignore", IllConditionedWarning)
         if method in FITTED:
-            theta = (
-                viscous_joints(exact.freq_hz, h, exact.dofs)
-                if method == "compliance"
-                else fit_decoupling(exact.freq_hz, exact.dofs, (exact.h_a, exact.h_b), exact.k_initial, h)
-            )
+            theta = _fit_source(exact, method, frfs).joints(chunk.first, chunk.count)
             no_lines = np.empty((0, exact.freq_hz.size, exact.n), np.complex128)
             return _ChunkResult(theta[None], no_lines, np.empty((1, 0, theta.shape[1])))
+        h = frfs(chunk.first, chunk.count)
         k_joint = joint_lines(exact, method, h, "nan")
         of_kj = joint_lines(exact, "ismm-kj", h, "nan") if method == "ismm" else k_joint[:0]
     kept = max(0, min(chunk.count, _KEPT - chunk.first))
@@ -195,8 +193,10 @@ def estimate_realisations(
     return found
 
 
-#: Starts of fits that a process keeps.
-_STARTS = 32
+#: Starts of fits that a process keeps; those of decoupling hold derivatives of all FRFs.
+_STARTS, _DECOUPLING_STARTS = 32, 2
+#: Realisations that a decoupling fit may begin with: of one in some hundred the residual does not look like noise.
+_TRIES = 3
 
 
 @dataclass(frozen=True)
@@ -264,60 +264,83 @@ class BandMeanSource:
 
 
 @dataclass(frozen=True)
-class ComplianceSource:
-    """Compliance fits, each begun where that of realisation 0 ends: a result depends on no other."""
+class FitSource:
+    """Fits, each begun where that of an early realisation ends: a result depends on no other.
 
-    freq_hz: FloatArray
-    dofs: tuple[str, ...]
+    Attributes
+    ----------
+    exact : Exact
+        Without the FRFs that the method does not take.
+    frfs : NoisyFrfs
+    """
+
+    exact: Exact
     frfs: NoisyFrfs
 
     @cached_property
     def key(self) -> str:
         """What the start depends on."""
-        content = hashlib.sha256(self.frfs.h.tobytes() + self.freq_hz.tobytes())
-        return content.hexdigest() + repr((self.dofs, self.frfs.noise, self.frfs.seed))
+        exact, content = self.exact, hashlib.sha256()
+        for array in (exact.freq_hz, exact.h_a, exact.h_b, exact.k_initial, self.frfs.h):
+            content.update(array.tobytes())
+        return content.hexdigest() + repr((exact.dofs, self.frfs.noise, self.frfs.seed))
 
     def __hash__(self) -> int:
         return hash(self.key)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, ComplianceSource) and self.key == other.key
+        return isinstance(other, FitSource) and self.key == other.key
+
+
+class ComplianceSource(FitSource):
+    """Compliance fits."""
 
     def __call__(self, first: int, count: int) -> Estimates:
         """Fit each realisation."""
-        found = np.full((3, count, 2 * len(self.dofs)), np.nan)
+        found = np.full((3, count, 2 * self.exact.n), np.nan)
         for i, gamma in enumerate(self.frfs(first, count)):
             try:
-                values, intervals = viscous_estimate(self.freq_hz, gamma, self.dofs, _start_of(self))
+                values, intervals = viscous_estimate(self.exact.freq_hz, gamma, self.exact.dofs, _start_of(self))
             except (ValueError, ArithmeticError):
                 continue  # no joint fits this realisation: it counts as failed
             found[:, i] = values, *intervals
         return Estimates(*found)
+
+    def joints(self, first: int, count: int) -> FloatArray:
+        """Return stiffness of all DOFs, then damping, of each realisation, shape (count, 2 n)."""
+        return viscous_joints(self.exact.freq_hz, self.frfs(first, count), self.exact.dofs, _start_of(self))
 
 
 @lru_cache(_STARTS)
 def _start_of(source: ComplianceSource) -> FitStart | None:
     """Fit realisation 0; None where no joint fits it."""
     try:
-        return FitStart.of(source.freq_hz, source.frfs(0, 1)[0], source.dofs, damping="viscous")
+        return FitStart.of(source.exact.freq_hz, source.frfs(0, 1)[0], source.exact.dofs, damping="viscous")
     except (ValueError, ArithmeticError):
         return None
 
 
-@dataclass(frozen=True)
-class DecouplingFitSource:
+class DecouplingFitSource(FitSource):
     """Fits to the FRFs between internal points, given those of the substructures."""
-
-    exact: Exact
-    frfs: NoisyFrfs
 
     def __call__(self, first: int, count: int) -> Estimates:
         """Fit each realisation."""
-        exact = self.exact
-        known = (exact.h_a, exact.h_b)
-        return Estimates.without_intervals(
-            fit_decoupling(exact.freq_hz, exact.dofs, known, exact.k_initial, self.frfs(first, count))
-        )
+        return Estimates.without_intervals(self.joints(first, count))
+
+    def joints(self, first: int, count: int) -> FloatArray:
+        """Return stiffness of all DOFs, then damping, of each realisation, shape (count, 2 n)."""
+        return fit_decoupling(_decoupling_fits_of(self), self.frfs(first, count))
+
+
+@lru_cache(_DECOUPLING_STARTS)
+def _decoupling_fits_of(source: DecouplingFitSource) -> RealisationFits:
+    exact = source.exact
+    first = (source.frfs(number, 1)[0] for number in range(_TRIES))
+    return decoupling_fits(exact.freq_hz, exact.dofs, (exact.h_a, exact.h_b), exact.k_initial, first)
+
+
+def _fit_source(exact: Exact, method: str, frfs: NoisyFrfs) -> ComplianceSource | DecouplingFitSource:
+    return (ComplianceSource if method == "compliance" else DecouplingFitSource)(needed_frfs(exact, method), frfs)
 
 
 @dataclass(frozen=True)
@@ -378,10 +401,8 @@ def _group(
     side_by_side, labels = 1, [method]
     if method in choice.own_estimators:
         source = OwnEstimatorSource(exact.freq_hz, exact.dofs, frfs, choice.own_estimators[method])
-    elif method == "compliance":
-        source = ComplianceSource(exact.freq_hz, exact.dofs, frfs)
     elif method in FITTED:
-        source = DecouplingFitSource(needed_frfs(exact, method), frfs)
+        source = _fit_source(exact, method, frfs)
     else:
         short = SHORT_FORM.get(method, method)
         source = BandMeanSource(needed_frfs(exact, short), short, frfs, case.band_sets)

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
 import numpy as np
 
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.identification.minimise import full_step
 from jointfrf.identification.model.assembly import Assembly
-from jointfrf.identification.model.fit import ModelProblem, fit_assembly
+from jointfrf.identification.model.fit import FoundModel, ModelProblem, fit_assembly
 from jointfrf.identification.model.likelihood import Likelihood
 from jointfrf.identification.model.prepare import Channels, prepare_model_fit
 from jointfrf.identification.noise import NoiseOptions, noise_about
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
 
-__all__ = ["joints_of_realisations"]
+__all__ = ["RealisationFits"]
 
 #: A minimum is found by a step that promised to lower the squares by less than this: the next would by far less.
 _LEAST = 1e-2
@@ -27,40 +27,45 @@ _STEPS = 6
 _LIKE = 1.1
 
 
-def joints_of_realisations(
-    freq_hz: FloatArray,
-    measured: Iterable[ComplexArray],
-    whole: Assembly,
-    channels: Channels,
-) -> Iterator[LawJoint]:
-    """Yield the joint of each of several sets of FRFs of the same assembly.
+class RealisationFits:
+    """Fits of many sets of FRFs of one assembly, each from the same minimum: a result depends on no other set.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
         Hz.
-    measured : iterable of ndarray, shape (n_freq, n_o, n_i)
-        Each as `identify_model` takes it, all FRFs measured, m/N.
     whole : Assembly
     channels : Channels
+    first : iterable of ndarray, shape (n_freq, n_o, n_i)
+        Sets as `identify_model` takes them, all FRFs measured, m/N: all begin at the first whose residual is noise.
 
     Notes
     -----
-    The first set is fitted as by `identify_model`. The others start there, and their noise, relative part and floor by
-    entry, is found from measured minus fitted FRFs in place of smooth ones. Each minimum is its own; a set that comes
-    to another noise, or does not converge, is fitted as the first.
+    The set to begin with is fitted as by `identify_model`. Noise of the others, relative part and floor by entry, is
+    found from measured minus fitted FRFs in place of smooth ones. Each minimum is its own; a set that comes to another
+    noise, or does not converge, is fitted as the first.
     """
-    start: _Start | None = None
-    for h in measured:
-        near = None if start is None else start.joint(h)
+
+    def __init__(self, freq_hz: FloatArray, whole: Assembly, channels: Channels, first: Iterable[ComplexArray]) -> None:
+        self._freq, self._whole, self._channels = freq_hz, whole, channels
+        self._start: _Start | None = None
+        for h in first:
+            found = self._alone(h)
+            is_right = found.test.is_noise and found.error is None
+            if found.minimum.converged and is_right and not found.problem.noise.is_assumed:
+                self._start = _Start(found.problem, found.minimum.x)
+                break
+
+    def joint(self, h: ComplexArray) -> LawJoint:
+        """Return the joint of a set of FRFs, shape (n_freq, n_o, n_i), m/N."""
+        near = None if self._start is None else self._start.joint(h)
         if near is not None:
-            yield near
-            continue
-        found = fit_assembly(prepare_model_fit(freq_hz, h, whole, channels, NoiseOptions(), ()))
-        yield _joint_of(found.problem, found.values)
-        is_right = found.test.is_noise and found.error is None
-        if start is None and found.minimum.converged and is_right and not found.problem.noise.is_assumed:
-            start = _Start(found.problem, found.minimum.x)
+            return near
+        found = self._alone(h)
+        return _joint_of(found.problem, found.values)
+
+    def _alone(self, h: ComplexArray) -> FoundModel:
+        return fit_assembly(prepare_model_fit(self._freq, h, self._whole, self._channels, NoiseOptions(), ()))
 
 
 def _joint_of(problem: ModelProblem, values: FloatArray) -> LawJoint:
@@ -68,7 +73,7 @@ def _joint_of(problem: ModelProblem, values: FloatArray) -> LawJoint:
 
 
 class _Start:
-    """The minimum of the first set, from which others are fitted."""
+    """A minimum from which other sets are fitted."""
 
     def __init__(self, problem: ModelProblem, x: FloatArray) -> None:
         self._problem, self._x = problem, x
