@@ -47,9 +47,8 @@ class Squares(Protocol):
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Smallest and largest values of the coordinates."""
 
-    @property
-    def longest(self) -> FloatArray:
-        """Largest step of each coordinate."""
+    def longest(self, x: FloatArray) -> FloatArray:
+        """Return the largest step of each coordinate from a point."""
 
     def cost(self, x: FloatArray) -> float:
         """Return the sum; inf where there is none."""
@@ -106,7 +105,7 @@ def minimise(
         steps in a row lowered it by less than the second: where squares hardly determine a direction, steps promise
         more than they gain.
     """
-    (lower, upper), longest = squares.bounds, squares.longest
+    lower, upper = squares.bounds
     least, small = least * squares.unit, small * squares.unit
     free = np.arange(start.size) != (-1 if held is None else held)
     x = np.where(free, np.clip(start, lower, upper), start)
@@ -115,7 +114,7 @@ def minimise(
         if not np.isfinite(at.information).all():
             break
         way = _Steps(at, np.flatnonzero(free & _can_move(at, x, squares.bounds)))
-        promised = way.step(0.0)[1]
+        promised, longest = way.step(0.0)[1], squares.longest(x)
         if promised < least:
             converged = True
             break

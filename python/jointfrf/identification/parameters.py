@@ -24,7 +24,7 @@ ParameterOrigin = Literal["joint", "mean", "part", "attachment", "response", "fo
 _WIDEST = 1e6
 #: No step changes a logarithm, or standard deviations of a prior, by more than this; nor does the first of a profile a
 #: logarithm.
-_LONGEST, _LONGEST_REACH = 4.0, 1.5
+_LONGEST, _LONGEST_REACH = 1.0, 1.5
 
 
 class FitParameter(NamedTuple):
@@ -186,10 +186,9 @@ class ParameterVector:
             logs = [np.log(np.where(self.is_log, np.maximum(limit, 0), 1)) for limit in (lower, upper)]
         return np.where(self.is_log, logs[0], lower / self.scale), np.where(self.is_log, logs[1], upper / self.scale)
 
-    @cached_property
-    def longest(self) -> FloatArray:
-        """Largest steps of a minimiser: of logarithms and of what has a prior; damping may be anything."""
-        return np.where(self.is_log | self.has_prior, _LONGEST, np.inf)
+    def longest(self, x: FloatArray) -> FloatArray:
+        """Return the largest steps of a minimiser: damping may be anything, but not at once."""
+        return np.where(self.is_log | self.has_prior, _LONGEST, _LONGEST * np.maximum(abs(x), 1))
 
     def value(self, i: int, x: FloatArray) -> float:
         """Return the value of one of the free parameters."""

@@ -87,8 +87,11 @@ class FormSquares:
     def __init__(self, forms: LineForms, joint: JointCoordinates) -> None:
         self.forms, self.joint = forms, joint
         self.bounds = joint.lower, joint.upper
-        self.longest = np.full(joint.lower.size, np.inf)
         self._last: tuple[FloatArray, float, ComplexArray, ComplexArray] | None = None
+
+    def longest(self, x: FloatArray) -> FloatArray:
+        """Return the largest step of each coordinate: there is none."""
+        return np.full(x.size, np.inf)
 
     def _at(self, x: FloatArray) -> tuple[float, ComplexArray, ComplexArray]:
         """Return the sum, the entries of C and the weighted residual; those of the last coordinates are kept."""

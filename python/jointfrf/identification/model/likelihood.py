@@ -45,10 +45,9 @@ class WeightedResiduals(ABC):
         """Smallest and largest values of the coordinates."""
         return self.vector.bounds
 
-    @property
-    def longest(self) -> FloatArray:
-        """Largest step of each coordinate."""
-        return self.vector.longest
+    def longest(self, x: FloatArray) -> FloatArray:
+        """Return the largest step of each coordinate from a point."""
+        return self.vector.longest(x)
 
     @property
     def used(self) -> NDArray[np.bool_]:
