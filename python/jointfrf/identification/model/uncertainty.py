@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointfrf.frf.calibration import CalibrationErrors, ErrorKind
 from jointfrf.identification.calibration import CalibrationSpread, Effects, effects_by_function
@@ -25,6 +26,8 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 __all__ = ["ModelGradient"]
 
 _TINY = float(np.finfo(float).tiny)
+#: The FRFs do not hold a logarithm, or a multiple of a value, with a standard deviation above this.
+_HELD = 100.0
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,8 @@ class ModelGradient:
         Of the weighted residual that such an error leaves.
     priors : LineParts
         Of each prior.
+    held : ndarray of bool, shape (p,)
+        Coordinates that the FRFs hold: what scatters along others is rounding.
     """
 
     information: FloatArray
@@ -56,6 +61,7 @@ class ModelGradient:
     of_errors: ComplexArray
     squares: FloatArray
     priors: LineParts
+    held: NDArray[np.bool_]
 
     @classmethod
     def of(cls, likelihood: Likelihood, minimum: Minimum, inflation: float) -> ModelGradient:
@@ -74,7 +80,10 @@ class ModelGradient:
         residual = likelihood.weighted(likelihood.difference(y))
         of_errors = likelihood.carried_back(slopes).conj() * y
         squares = np.asarray(abs(y) ** 2 * likelihood.precision, np.float64)
-        return cls(kept @ whole @ kept.T, inflation, slopes, residual, of_errors, squares, priors)
+        information = kept @ whole @ kept.T
+        size = np.where(vector.is_log, 1, np.maximum(abs(x), 1))[:n]
+        held = np.diagonal(information) * size**2 > _HELD**-2
+        return cls(information, inflation, slopes, residual, of_errors, squares, priors, held)
 
     @cached_property
     def covariance(self) -> FloatArray:
@@ -104,7 +113,7 @@ class ModelGradient:
         lines = self._parts(1)
         of_lines, of_blocks = self._scatter(lines, self.inflation), Scatter.none(len(self.slopes))
         size = np.maximum(np.diagonal(self.information), _TINY)
-        share = np.einsum("lpp->lp", lines.information[:n_freq]) / size
+        share = (np.einsum("lpp->lp", lines.information[:n_freq]) / size)[:, self.held]
         seen = np.flatnonzero(share.any(axis=1))
         if seen.size >= 2 * BLOCKS:
             member = block_members(share, seen)
@@ -117,9 +126,16 @@ class ModelGradient:
         return spread_of_scatters(np.full(size.size, by_noise), of_lines, of_blocks, hits, beside)
 
     def _scatter(self, parts: LineParts, correlated: float = 1.0) -> Scatter:
-        variance, degrees = scatter_of(self.information, [parts])
+        own, found = np.flatnonzero(self.held), Scatter.none(len(self.information))
+        both = own[:, None], own
+        information = self.information[both]
+        variance, degrees = scatter_of(
+            information, [LineParts(parts.gradient[:, own], parts.information[:, both[0], own])]
+        )
         with np.errstate(divide="ignore", invalid="ignore"):
-            return Scatter(correlated * variance / np.diagonal(self.covariance), degrees / correlated)
+            found.factor[own] = correlated * variance / np.diagonal(inverse_information(information, open_ends=True))
+        found.degrees[own] = degrees / correlated
+        return found
 
     def calibration(self, errors: CalibrationErrors, freq_hz: FloatArray) -> CalibrationSpread:
         """Return what errors of FRFs that are smooth over frequency add to the coordinates."""
