@@ -204,8 +204,9 @@ def _smooth_at_level(
     # Measured FRFs as weights favour lines that noise has made small.
     variance = _relative_variance(np.sqrt(near_squares(h)), level)
     first = smoothed_in_pieces(freq, h, variance, OrderSearch(), reciprocal=reciprocal)
-    variance = _relative_variance(first.h, level)
-    return smoothed_in_pieces(freq, h, variance, OrderSearch(), reciprocal=reciprocal, start=first.poles)
+    variance, poles = _relative_variance(first.h, level), first.poles
+    del first
+    return smoothed_in_pieces(freq, h, variance, OrderSearch(), reciprocal=reciprocal, start=poles)
 
 
 def _smooth_like(
