@@ -114,10 +114,11 @@ def minimise(
         if not np.isfinite(at.information).all():
             break
         way = _Steps(at, np.flatnonzero(free & _can_move(at, x, squares.bounds)))
-        promised, longest = way.step(0.0)[1], squares.longest(x)
+        promised = way.step(0.0)[1]
         if promised < least:
             converged = True
             break
+        longest = squares.longest(x)
         while damping <= _LARGEST:
             step, left = way.step(damping)
             if left < 0.1 * least:

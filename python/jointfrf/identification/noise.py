@@ -122,9 +122,12 @@ class KnownNoise:
         return self.model or self.smooth
 
     @classmethod
-    def given(cls, level: float, calibration: CalibrationErrors | None = None) -> KnownNoise:
+    def given(
+        cls, level: float, calibration: CalibrationErrors | None = None, smooth: SmoothFrfs | None = None
+    ) -> KnownNoise:
         """Return noise of a level that the user gave."""
-        return cls(level, 1.0, False, np.empty(0, np.intp), is_given=True, calibration=calibration)
+        none = np.empty(0, np.intp)
+        return cls(level, 1.0, False, none, is_given=True, smooth=smooth, calibration=calibration)
 
     @classmethod
     def found(cls, model: NoiseModel) -> KnownNoise:
@@ -160,7 +163,7 @@ def noise_of_matrix(freq: FloatArray, h: ComplexArray, options: NoiseOptions, *,
     like = options.like.smooth if isinstance(options.like, NoiseModel) else options.like
     if level is not None:
         found = _smooth_at_level(freq, h, level, like, reciprocal=reciprocal)
-        known = replace(KnownNoise.given(level, calibration), smooth=found)
+        known = KnownNoise.given(level, calibration, found)
         variance = _relative_variance(found.h, level)
     elif options.noise is not None:
         variance = options.variance(h.shape, np.ones(h.shape[1:], bool))
@@ -169,7 +172,7 @@ def noise_of_matrix(freq: FloatArray, h: ComplexArray, options: NoiseOptions, *,
         usual = float(np.median(of_entry[of_entry < 1] if (of_entry < 1).any() else of_entry))
         begun = _smooth_like(freq, h, variance, like, reciprocal=reciprocal)
         found = begun or smoothed_in_pieces(freq, h, variance, OrderSearch(), reciprocal=reciprocal)
-        known = replace(KnownNoise.given(usual, calibration), smooth=found)
+        known = KnownNoise.given(usual, calibration, found)
     else:
         model = estimate_noise(
             freq, h, reciprocal=reciprocal, coherence=options.coherence, averages=options.averages,
@@ -213,7 +216,7 @@ def _smooth_like(
     freq: FloatArray, h: ComplexArray, variance: FloatArray, like: SmoothFrfs | None, *, reciprocal: bool
 ) -> SmoothFrfs | None:
     """Return smooth FRFs with the poles of others, relocated; None where these leave more than of the others."""
-    if like is None or not like.is_smooth:
+    if like is None or not like.is_smooth or is_long(len(freq)):  # pieces have no common poles
         return None
     search = OrderSearch(patience=0)
     found = smoothed_in_pieces(freq, h, variance, search, reciprocal=reciprocal, start=like.poles)

@@ -211,6 +211,25 @@ def test_what_no_frf_shows_is_as_it_was_believed_and_open_on_both_sides(tmp_path
         np.testing.assert_allclose(fit.intervals.of(name, 0.95), (low, high), rtol=0, atol=0.05 * (high - low))
 
 
+def test_a_joint_of_which_no_frf_says_anything_is_as_it_was_believed():
+    """Both parts stand on springs beside the joint, whose only DOF no channel sees."""
+
+    def standing(k):
+        chain = jf.chain([2.0], [k], [3.0], ground="start")
+        both = [sparse.block_diag([matrix, [[value]]]).tocsr() for matrix, value in
+                ((chain.stiffness, 1e4), (chain.mass, 1.0), (chain.damping, 1.0))]  # fmt: skip
+        return replace(chain, stiffness=both[0], mass=both[1], damping=both[2], dofs=("1:x", "9:y"))
+
+    sides = [jf.Substructure(standing(k), ["9:y"], exact=True) for k in (2e3, 5e3)]
+    whole = jf.Assembly(*sides, jf.Joint([1e4], [2.0], ["y"]))
+    freq, channels = np.linspace(1, 12, 60), ["A/1:x"]
+    measured = jf.pollute(whole.receptance(freq, channels, channels), 0.01, seed=1)
+    fit = fit_of(freq, measured, whole, channels, channels)
+    assert fit.residual_is_noise
+    assert (fit.value["c_y"], fit.std_error["c_y"]) == (pytest.approx(2.0), np.inf)
+    assert fit.intervals.of("k_y", 0.95) == (0.0, np.inf)
+
+
 def test_frfs_of_the_assembly_are_those_of_its_matrices():
     whole = assembly()
     model = jf.assemble(arm(), free_beam(), PLAIN, arm().index("7:y", "7:theta"), free_beam().index("1:y", "1:theta"))

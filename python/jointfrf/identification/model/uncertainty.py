@@ -25,7 +25,6 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["ModelGradient"]
 
-_TINY = float(np.finfo(float).tiny)
 #: The FRFs do not hold a logarithm, or a multiple of a value, with a standard deviation above this.
 _HELD = 100.0
 
@@ -90,14 +89,20 @@ class ModelGradient:
         """Covariance of the coordinates, from noise as known, shape (p, p)."""
         return inverse_information(self.information, open_ends=True)
 
+    @cached_property
+    def _of_held(self) -> FloatArray:
+        """The information on what is held."""
+        return self.information[np.ix_(self.held, self.held)]
+
     def _parts(self, axis: int) -> LineParts:
-        """Return the parts of each line (axis 1), response (2) or force (3), and of each prior."""
+        """Return the parts of each line (axis 1), response (2) or force (3), and of each prior, in what is held."""
         slopes = np.ascontiguousarray(np.moveaxis(self.slopes, axis, 0))
         flat = slopes.reshape(*slopes.shape[:2], -1).view(np.float64)
         residual = np.ascontiguousarray(np.moveaxis(self.residual, axis - 1, 0)).reshape(len(flat), -1)
         gradient = (flat @ residual.view(np.float64)[:, :, None])[..., 0]
-        both = (gradient, self.priors.gradient), (flat @ flat.swapaxes(1, 2), self.priors.information)
-        return LineParts(*(np.concatenate(one) for one in both))
+        gradient = np.concatenate([gradient, self.priors.gradient])
+        information = np.concatenate([flat @ flat.swapaxes(1, 2), self.priors.information])
+        return LineParts(gradient[:, self.held], information[:, self.held][:, :, self.held])
 
     def spread(self, by_noise: float, beside: FloatArray | float = 0.0) -> Spread:
         """Return variance factors by the scatter between lines, blocks, responses and forces.
@@ -112,8 +117,7 @@ class ModelGradient:
         _, n_freq, n_o, n_i = self.slopes.shape
         lines = self._parts(1)
         of_lines, of_blocks = self._scatter(lines, self.inflation), Scatter.none(len(self.slopes))
-        size = np.maximum(np.diagonal(self.information), _TINY)
-        share = (np.einsum("lpp->lp", lines.information[:n_freq]) / size)[:, self.held]
+        share = np.einsum("lpp->lp", lines.information[:n_freq]) / np.diagonal(self._of_held)
         seen = np.flatnonzero(share.any(axis=1))
         if seen.size >= 2 * BLOCKS:
             member = block_members(share, seen)
@@ -123,18 +127,16 @@ class ModelGradient:
             parts = LineParts(whole @ lines.gradient, np.tensordot(whole, lines.information, 1))
             of_blocks = self._scatter(parts)
         hits = [self._scatter(self._parts(axis)) for axis, count in ((2, n_o), (3, n_i)) if count > 1]
-        return spread_of_scatters(np.full(size.size, by_noise), of_lines, of_blocks, hits, beside)
+        return spread_of_scatters(np.full(self.held.size, by_noise), of_lines, of_blocks, hits, beside)
 
     def _scatter(self, parts: LineParts, correlated: float = 1.0) -> Scatter:
-        own, found = np.flatnonzero(self.held), Scatter.none(len(self.information))
-        both = own[:, None], own
-        information = self.information[both]
-        variance, degrees = scatter_of(
-            information, [LineParts(parts.gradient[:, own], parts.information[:, both[0], own])]
-        )
-        with np.errstate(divide="ignore", invalid="ignore"):
-            found.factor[own] = correlated * variance / np.diagonal(inverse_information(information, open_ends=True))
-        found.degrees[own] = degrees / correlated
+        found = Scatter.none(self.held.size)
+        if self.held.any():
+            variance, degrees = scatter_of(self._of_held, [parts])
+            with np.errstate(divide="ignore", invalid="ignore"):
+                known = np.diagonal(inverse_information(self._of_held, open_ends=True))
+                found.factor[self.held] = correlated * variance / known
+            found.degrees[self.held] = degrees / correlated
         return found
 
     def calibration(self, errors: CalibrationErrors, freq_hz: FloatArray) -> CalibrationSpread:
