@@ -172,21 +172,25 @@ def exact(trial: CalibrationTrial) -> tuple[np.ndarray, np.ndarray]:
     return models.FREQ, models.exact(models.ModelTrial(trial.fit))
 
 
-def one_draw(trial: CalibrationTrial, place: int, number: int) -> Draw | None:
-    """Fit one draw, with noise and calibration unknown."""
+def fitted(trial: CalibrationTrial, place: int, number: int) -> jf.Fit:
+    """Return the fit of one draw, with noise and calibration unknown."""
     freq, h = exact(trial)
     rng = np.random.default_rng([1000 * place + number, 30])
     noisy = h * trial.factor(rng, freq, h.shape)
     noisy = noisy + trial.level * h * _normal(rng, h.shape)
+    if trial.fit == "joint":
+        return jf.identify(freq, noisy, ["y", "theta"], damping="viscous")
+    channels = models.CHANNELS[trial.fit]
+    return jf.identify_model(freq, noisy, models.whole(models.GUESS), channels, channels)
+
+
+def one_draw(trial: CalibrationTrial, place: int, number: int) -> Draw | None:
+    """Fit one draw, and time it."""
     start = time.process_time()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            if trial.fit == "joint":
-                fit = jf.identify(freq, noisy, ["y", "theta"], damping="viscous")
-            else:
-                channels = models.CHANNELS[trial.fit]
-                fit = jf.identify_model(freq, noisy, models.whole(models.GUESS), channels, channels)
+            fit = fitted(trial, place, number)
         except ValueError:
             # No joint was found, and that is said.
             return None
