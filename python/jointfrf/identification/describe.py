@@ -335,11 +335,12 @@ def _with_best_estimates(fit: Fit, result: JointEstimate) -> Fit:
             which = int(group.which[i])
             intervals = fit.confidence_interval(0.95) if intervals is None else intervals
             low, high = intervals[fit.parameters[which].name]
-            own = (1 / low - group.x[i]) / float(ndtri(0.975)) if low > 0 else error[i]
+            spring = float(group.joint.springs[group.joint.dofs[i]])
+            own = (1 / (low + spring) - group.x[i]) / float(ndtri(0.975)) if low > 0 else error[i]
             if np.isfinite(high) or not own > 0:
                 continue
             z = float(group.x[i] / own)
-            estimate[which] = 1 / (own * (z + float(ndtri(1 - 0.5 * ndtr(z)))))
+            estimate[which] = 1 / (own * (z + float(ndtri(1 - 0.5 * ndtr(z))))) - spring
     return replace(fit, estimate=estimate)
 
 

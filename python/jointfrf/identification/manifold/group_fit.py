@@ -318,9 +318,9 @@ def effects_of(
         c = np.where(unknown, smooth_compliance(own), c)
     # Where cross terms are unknown there is no point of the manifold.
     on = fit.on if fit.on is not None and not unknown.any() else None
-    point = _first_points(own, c) if on is None else OnManifold(on.h[lines], on.m[lines], on.squares[lines])
+    point = _first_points(own, c) if on is None else OnManifold(on.h[lines], on.q[lines], on.squares[lines])
     point = _rescued(own, c, point)
-    fitted = own.entries.take(frfs_of_joint(point.h, point.m, c))
+    fitted = own.entries.take(frfs_of_joint(point.h, point.q, c, own.reference))
     here, more = problem._replace(data=own, unknown=problem.unknown[lines]), iter(changes)
     # A form is factorised once for all changes of a call.
     at_once = max(_AT_ONCE, _MOST_ENTRIES // max(fitted.size, 1))
@@ -505,7 +505,7 @@ def _linearised(
 
     def of_lines(own: slice) -> Sequence[NDArray[Any]]:
         here = problem._replace(data=problem.data.on_lines(own), unknown=problem.unknown[own])
-        point = OnManifold(on.h[own], on.m[own], on.squares[own])
+        point = OnManifold(on.h[own], on.q[own], on.squares[own])
         if prior is not None:
             point = expected_m(here.data, c[own], point, prior.on_lines(own))
         targets = (here.data.measured, here.data.smooth) if here.unknown.any() else (here.data.measured,)
@@ -533,10 +533,10 @@ def _rescued(data: LineData, c: ComplexArray, on: OnManifold) -> OnManifold:
         return on
     other = starts_on_manifold(data.on_lines(far), c[far], _OTHER_STEPS)
     squares = on.squares.copy()
-    h, m = on.h.copy(), on.m.copy()
+    h, q = on.h.copy(), on.q.copy()
     nearer = other.squares < squares[far]
-    h[far[nearer]], m[far[nearer]], squares[far[nearer]] = (x[nearer] for x in other)
-    return OnManifold(h, m, squares)
+    h[far[nearer]], q[far[nearer]], squares[far[nearer]] = (x[nearer] for x in other)
+    return OnManifold(h, q, squares)
 
 
 def _of_coordinates(problem: GroupProblem, several: Sequence[LineForms]) -> tuple[list[LineForms], ComplexArray | None]:
