@@ -172,7 +172,7 @@ def record_of(name: str) -> Record:
         one: dict(zip(("value", "low", "high"), map(float, (fit.value[one], *limits[one])), strict=True))
         for one in fit.value
     }
-    codes = sorted({getattr(one, "code", one.kind) for one in fit.findings if one.severity != "note"})
+    codes = sorted({one.code for one in fit.findings if one.severity != "note"})
     return {"parameters": parameters, "warnings": codes, "seconds": round(time.process_time() - start, 2)}
 
 
