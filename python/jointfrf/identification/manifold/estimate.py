@@ -114,11 +114,7 @@ class JointEstimate(NamedTuple):
     @property
     def starts(self) -> tuple[GroupStart, ...]:
         """Where fits of other FRFs of the same structure begin; not of those unconverged."""
-        return tuple(
-            GroupStart.of(group, group)
-            for group in self.groups
-            if group.converged
-        )
+        return tuple(GroupStart.of(group, group) for group in self.groups if group.converged)
 
 
 def estimate_joint(
@@ -161,8 +157,8 @@ def estimate_joint(
         unknown = _unknown_entries(dofs, cross, used, len(lines.measured))
         start = known.get((tuple(dofs.tolist()), own.parameters))
         plain = lines._replace(springs=None)
-        # Unknown entries are entries of C, which is R without springs. Cross terms of T = 1 - Z R would make the columns
-        # by Q nearly dependent, and projections slow.
+        # Unknown entries are entries of C, which is R without springs. Cross terms of T = 1 - Z R would make columns by Q
+        # nearly dependent, and projections slow.
         has_springs = not (own.has_cross_terms or unknown.any())
         lines = plain.with_springs() if has_springs else plain
         if start is not None:
@@ -310,7 +306,7 @@ class _Search:
 
     @cached_property
     def on_manifold(self) -> GroupFit:
-        """The fit without cross terms, from the compliance of single lines, and if that is lost from the diagonal of C."""
+        """The fit without cross terms, from single lines, and if that is lost from the diagonal of C."""
         found = fit_dofs(self.problem, self.starts)
         if not found.is_lost:
             return found

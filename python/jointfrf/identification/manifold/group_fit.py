@@ -75,8 +75,6 @@ _FEW_STARTS = 2
 _AT_ONCE = 8
 #: Entries of changed FRFs held at once where more changes than that are: 64 MB.
 _MOST_ENTRIES = 2**22
-#: Factors by which poorly determined DOFs are made softer: at first, and where that led nowhere.
-_SOFTER, _SOFTER_STILL = 3.0, 4.0
 
 
 class GroupProblem(NamedTuple):
@@ -230,8 +228,7 @@ def fit_dofs(
 ) -> GroupFit:
     """Fit from one start after the other until the residual is that of the noise; else keep the lowest.
 
-    A fit may go to and fro without end at a residual that is noise; where two starts lead there, others do, too. Where
-    none leads to noise, poorly determined DOFs are made softer.
+    A fit may go to and fro without end at a residual that is noise; where two starts lead there, others do, too.
 
     Parameters
     ----------
@@ -258,8 +255,7 @@ def fit_dofs(
             break
     if best is None:
         raise np.linalg.LinAlgError("no start of the fit stays finite")
-    is_last = best.is_noise or best.is_lost or problem.sides_bend or not problem.joint.in_compliance
-    return best if is_last else _from_softer(best)
+    return best
 
 
 def gradients_of(fit: GroupFit, changes: Iterable[ComplexArray]) -> FloatArray:
@@ -342,28 +338,6 @@ def _gradients_beside(fit: GroupFit, changes: Iterable[ComplexArray]) -> FloatAr
         weighted = np.einsum("lqr,lr->lq", fit.forms.weight[:, :n, :n], np.nan_to_num(moved))
         found.append(np.einsum("lqp,lq->p", adjoint[:, :n], weighted).real)
     return np.array(found).reshape(-1, fit.x.size)
-
-
-def _from_softer(best: GroupFit) -> GroupFit:
-    """Start again from softer values of poorly determined DOFs: far too stiff, a fit may be caught.
-
-    From a few times the compliance that the data can resolve, up to that of the structure around the joint.
-    """
-    joint, softest = best.joint, best.problem.data.own_size
-    n, of_rate = joint.n, joint.dofs[joint.n :]
-    factor = _SOFTER
-    while not best.is_noise:
-        a = best.x[:n]
-        error = np.sqrt(np.diagonal(best.covariance)[:n])
-        softer = factor * np.maximum(a, error)
-        poorly = (error > _POORLY * a) & (softer < softest)
-        if not poorly.any():
-            break
-        # A rate that belongs to another compliance says nothing here.
-        start = np.r_[np.where(poorly, softer, a), np.where(poorly[of_rate], 0.0, best.x[n:])]
-        found = _iterated(best.problem, start)
-        best, factor = (found, _SOFTER) if found.squares < best.squares else (best, _SOFTER_STILL * factor)
-    return best
 
 
 def _iterated(

@@ -315,7 +315,7 @@ def starts_on_manifold(data: LineData, r: ComplexArray, steps: int) -> OnManifol
     # A view: what was found replaces gamma_jj where the next starts are sought.
     h = gamma[:, :n, :n]
     best = OnManifold(h, np.zeros_like(h), np.full(len(r), np.inf))
-    for first_q in _FIRST_Q:
+    for first_q in _FIRST_WITH_SPRINGS if data.reference.any() else _FIRST:
         far = np.flatnonzero(~(best.squares <= _FAR_OFF * np.median(best.squares)) | ~np.isfinite(best.squares))
         if far.size == 0:
             break
@@ -333,49 +333,36 @@ def starts_on_manifold(data: LineData, r: ComplexArray, steps: int) -> OnManifol
 
 
 def _from_jk(gamma: ComplexArray, r: ComplexArray, springs: FloatArray) -> ComplexArray:
-    """Return Q = (1 - A) R^-1 with A of gamma_jk = gamma_jj (1 - Z R) A: for stiff joints."""
+    """Return Q = (1 - A) R^-1 with A of gamma_jk = gamma_jj A; without springs."""
     n = r.shape[-1]
-    t = np.eye(n) - springs[:, None] * r
-    return (np.eye(n) - solve(gamma[:, :n, :n] @ t, gamma[:, :n, n:], on_singular="nan")) @ _inverse(r)
+    return (np.eye(n) - solve(gamma[:, :n, :n], gamma[:, :n, n:], on_singular="nan")) @ _inverse(r)
 
 
 def _from_kj(gamma: ComplexArray, r: ComplexArray, springs: FloatArray) -> ComplexArray:
     """Return Q = (1 - A) R^-1 with A of gamma_kk = (gamma_kj (1 - Z R) + R) A."""
     n = r.shape[-1]
-    t = np.eye(n) - springs[:, None] * r
-    left = gamma[:, n:, :n] @ t + r
+    left = gamma[:, n:, :n] @ (np.eye(n) - springs[:, None] * r) + r
     return (np.eye(n) - solve(left, gamma[:, n:, n:], on_singular="nan")) @ _inverse(r)
 
 
-def _from_kk(gamma: ComplexArray, r: ComplexArray, springs: FloatArray) -> ComplexArray:
-    """Return Q by least squares, entry by entry, of gamma_jk = H F, gamma_kk - gamma_kj H^-1 gamma_jk = R - R Q R.
-
-    For joints with reference springs and without cross terms, whatever their stiffness.
-    """
+def _from_inverse(gamma: ComplexArray, r: ComplexArray, springs: FloatArray) -> ComplexArray:
+    """Return Q = M = (C + Y_B)^-1 with Y_B of the inverse of gamma; without springs."""
     n = r.shape[-1]
-    if not springs.any():
-        return np.full_like(r, np.nan)
+    return _inverse(r + _inverse(_inverse(gamma)[:, n:, n:] - _inverse(r)))
+
+
+def _from_kk(gamma: ComplexArray, r: ComplexArray, springs: FloatArray) -> ComplexArray:
+    """Return Q by least squares, by entry, of gamma_jk = H F and gamma_kk - gamma_kj H^-1 gamma_jk = R - R Q R."""
+    n = r.shape[-1]
     d = np.einsum("lpp->lp", r)
-    t = 1 - springs * d
+    t, one = 1 - springs * d, np.eye(n)
     ratio = solve(gamma[:, :n, :n], gamma[:, :n, n:], on_singular="nan")
     own = gamma[:, n:, n:] - gamma[:, n:, :n] @ ratio
-    one = np.eye(n)
-    of_jk, of_kk = t[:, :, None] * d[:, None, :], d[:, :, None] * d[:, None, :]
     # The first equation is divided by the springs, so that both are compliances.
-    of_jk, left = of_jk / springs[:, None], (t[:, :, None] * one - ratio) / springs[:, None]
-    right = d[:, :, None] * one - own
+    of_jk, left = (t / springs)[:, :, None] * d[:, None, :], (t[:, :, None] * one - ratio) / springs[:, None]
+    of_kk, right = d[:, :, None] * d[:, None, :], d[:, :, None] * one - own
     found: ComplexArray = (of_jk.conj() * left + of_kk.conj() * right) / (abs(of_jk) ** 2 + abs(of_kk) ** 2)
     return found
-
-
-def _from_inverse(gamma: ComplexArray, r: ComplexArray, springs: FloatArray) -> ComplexArray:
-    """Return Q by M = (C + Y_B)^-1 with Y_B of the inverse of gamma; without springs Q = M."""
-    c = _inverse(_inverse(r) - np.diag(springs)) if springs.any() else r
-    m = _inverse(c + _inverse(_inverse(gamma)[:, r.shape[-1] :, r.shape[-1] :] - _inverse(c)))
-    if not springs.any():
-        return m
-    t = np.eye(r.shape[-1]) - springs[:, None] * r
-    return _inverse(t) @ (m - springs[:, None] * t.swapaxes(1, 2)) @ _inverse(t).swapaxes(1, 2)
 
 
 def _inverse(a: ComplexArray) -> ComplexArray:
@@ -383,13 +370,14 @@ def _inverse(a: ComplexArray) -> ComplexArray:
 
 
 #: Algebraic first values of Q, exact without noise; none last.
-_FIRST_Q: tuple[Callable[[ComplexArray, ComplexArray, FloatArray], ComplexArray], ...] = (
+_FIRST: tuple[Callable[[ComplexArray, ComplexArray, FloatArray], ComplexArray], ...] = (
     _from_jk,
-    _from_kk,
     _from_kj,
     _from_inverse,
     lambda gamma, r, springs: np.zeros_like(r),
 )
+#: The same for a joint without cross terms and with reference springs.
+_FIRST_WITH_SPRINGS = (_from_kk, _from_kj, _FIRST[-1])
 
 
 def smooth_compliance(data: LineData) -> ComplexArray:
