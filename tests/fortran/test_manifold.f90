@@ -3,7 +3,7 @@
 program test_manifold
   use testing, only: check, check_close, check_same, dp, finish, infinity, ip, not_a_number, random_lines, seed, &
     set_threads, transposed, uniform
-  use jointfrf, only: jf_expect_on_joint
+  use jointfrf, only: jf_expect_on_joint, jf_expect_with_springs, jf_forms_with_springs, jf_project_with_springs
   use jointfrf_manifold, only: expect_on_joint, joint_forms, project_on_joint
   use jointfrf_engine, only: engine_automatic, engine_lapack, engine_plain, set_engine
   implicit none
@@ -48,6 +48,7 @@ program test_manifold
   call expected(3, .true., .false., 0.6_dp)
   call expected(2, .false., .true., 0.6_dp)
   call expected_arguments()
+  call spring_arguments()
   call orders_of_storage(.true.)
   call orders_of_storage(.false.)
   call bad_lines()
@@ -359,6 +360,36 @@ contains
     call check_same(h, s%h, 'expected: H is not touched')
     call check_same(m, s%m, 'expected: M is not touched')
   end subroutine try_expected
+
+  !> Springs that are negative, infinite or no number are refused before anything is touched.
+  subroutine spring_arguments()
+    type(sample) :: s
+    complex(dp) :: h(2, 2, lines), m(2, 2, lines), w(3, 3, lines), p(3, lines, 1)
+    real(dp) :: squares(lines), left(lines, 1), spread_m(2, 2, lines), bad(3)
+    integer(ip), parameter :: symmetric = 1, n = 2, none = 0, steps = 3, n_free = 3, one = 1
+    integer(ip) :: line_info(lines), info, n_freq
+    integer :: i
+
+    s = make_sample(2, .true., .false.)
+    n_freq = lines
+    spread_m = 1
+    bad = [-1.0_dp, infinity(), not_a_number()]
+    do i = 1, 3
+      h = s%h
+      m = s%m
+      s%spring(2) = bad(i)
+      call jf_project_with_springs('N', symmetric, n, none, n_freq, steps, gain, s%spring, s%gamma, s%w, s%whitening, &
+                                   s%c, h, m, squares, line_info, info)
+      call check(info == -8, 'springs of a projection')
+      call jf_expect_with_springs('N', symmetric, n, none, n_freq, 0.1_dp, spread_m, s%spring, s%w, s%whitening, s%c, &
+                                  h, m, line_info, info)
+      call check(info == -8, 'springs of an expectation')
+      call jf_forms_with_springs('N', symmetric, n, n_free, none, n_freq, one, s%spring, s%gamma, s%w, s%whitening, &
+                                 s%c, h, m, w, p, left, line_info, info)
+      call check(info == -8, 'springs of forms')
+      call check_same(h, s%h, 'springs: H is not touched')
+    end do
+  end subroutine spring_arguments
 
   !> Lines stored as C does, several targets, and a gradient for each.
   subroutine orders_of_storage(reciprocal)
