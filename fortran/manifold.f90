@@ -1,12 +1,12 @@
 !> FRFs that fit a joint: the manifold on which a fit of measured FRFs is linearised.
 !>
-!> Whatever the substructures are, the receptances at the two sides of a joint K* can be written with two free matrices H
-!> and Q, symmetric if the structure is reciprocal, and with the compliance R = (K* + Z)^-1 of the joint in parallel with
-!> reference springs Z >= 0, a diagonal matrix:
+!> Whatever the substructures are, the receptances at the two sides of a joint K* can be written with two free matrices
+!> H and Q, symmetric if the structure is reciprocal, and with the compliance R = (K* + Z)^-1 of the joint in parallel
+!> with reference springs Z >= 0, a diagonal matrix:
 !>   gamma_jj = H, gamma_jk = H F, gamma_kj = F' H, gamma_kk = F' H F + R A,
 !>   F = T A, F' = A' T', A = 1 - Q R, A' = 1 - R Q, T = 1 - Z R, T' = 1 - R Z.
-!> Nothing is inverted. With Z > 0 the form is regular for rigid DOFs (R = 0, T = 1) and free DOFs (R = 1/Z, T = 0); with
-!> Z = 0, R is the compliance of the joint and Q = (Y_B + R)^-1 with the receptance Y_B of side k alone.
+!> Nothing is inverted. With Z > 0 the form is regular for rigid DOFs (R = 0, T = 1) and free DOFs (R = 1/Z, T = 0).
+!> With Z = 0, R is the compliance of the joint and Q = (Y_B + R)^-1 with the receptance Y_B of side k alone.
 !>
 !> Lanes are frequency lines, also with the engine that is LAPACK elsewhere, and for a single line; blocks of lines are
 !> shared among threads.
@@ -107,8 +107,8 @@ contains
   !> squares      weighted squares of the distance, shape (n_freq)
   !> steps        at most
   !> least_gain   a line has arrived when a step lowers its squares by no more
-  subroutine project_on_joint(transposed, reciprocal, steps, least_gain, spring, gamma, inverse_std, whitening, r, h, q, &
-                              squares, line_info, info)
+  subroutine project_on_joint(transposed, reciprocal, steps, least_gain, spring, gamma, inverse_std, whitening, r, h, &
+                              q, squares, line_info, info)
     logical, intent(in) :: transposed, reciprocal
     integer(ip), intent(in) :: steps
     real(dp), intent(in) :: least_gain
@@ -134,13 +134,13 @@ contains
     call run(work, 30.0_dp*steps, stat, info)
   end subroutine project_on_joint
 
-  !> The expected FRFs near ones that fit a joint, if entries of M = (Y_B + K*^-1)^-1 = Z T' + T Q T' are normal about 0
-  !> with given deviations, and the error of the FRFs is `share_of_noise` times their noise: least squares of both by one
+  !> The expected FRFs near ones that fit a joint, if entries of M = (Y_B + K*^-1)^-1 = Z T' + T Q T' are normal about
+  !> 0 with given deviations, and the error of the FRFs is `share_of_noise` times their noise: least squares of both by one
   !> Gauss-Newton step. Off-diagonal entries of T are not in the prior.
   !> spread_m     standard deviations of the entries of M, shape (n, n, n_freq), > 0, N/m
   !> spring, inverse_std, whitening, r, h, q    as in `project_on_joint`
-  subroutine expect_on_joint(transposed, reciprocal, share_of_noise, spread_m, spring, inverse_std, whitening, r, h, q, &
-                             line_info, info)
+  subroutine expect_on_joint(transposed, reciprocal, share_of_noise, spread_m, spring, inverse_std, whitening, r, h, &
+                             q, line_info, info)
     logical, intent(in) :: transposed, reciprocal
     real(dp), intent(in) :: share_of_noise, spring(:)
     real(dp), contiguous, target, intent(in) :: spread_m(:, :, :), inverse_std(:, :, :), whitening(:, :, :)
@@ -177,8 +177,8 @@ contains
   !> information  W, shape (u, u, n_freq); free entries of R are the upper triangle row by row, or all
   !> gradient     p, shape (u, n_freq, n_target)
   !> squares      s, shape (n_freq, n_target)
-  subroutine joint_forms(transposed, reciprocal, spring, gamma, inverse_std, whitening, r, h, q, information, gradient, &
-                         squares, line_info, info)
+  subroutine joint_forms(transposed, reciprocal, spring, gamma, inverse_std, whitening, r, h, q, information, &
+                         gradient, squares, line_info, info)
     logical, intent(in) :: transposed, reciprocal
     real(dp), intent(in) :: spring(:)
     complex(dp), contiguous, target, intent(in) :: gamma(:, :, :, :), r(:, :, :), h(:, :, :), q(:, :, :)

@@ -830,8 +830,8 @@ contains
     call release_traps(host)
   end subroutine jf_expect_with_springs
 
-  !> Information of measured FRFs on the compliance R of a joint in parallel with reference springs, near FRFs that fit it,
-  !> with H and Q free. The form is that of jf_joint_forms, d being the change of the free entries of R.
+  !> Information of measured FRFs on the compliance R of a joint in parallel with reference springs, near FRFs that fit
+  !> it, with H and Q free. The form is that of jf_joint_forms, d being the change of the free entries of R.
   !> reciprocal, n, n_correlated, inverse_std, whitening    as in jf_project_on_joint
   !> n_free, n_target, gamma    as in jf_joint_forms
   !> spring, r_joint    as in jf_project_with_springs

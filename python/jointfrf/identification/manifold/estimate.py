@@ -157,8 +157,8 @@ def estimate_joint(
         unknown = _unknown_entries(dofs, cross, used, len(lines.measured))
         start = known.get((tuple(dofs.tolist()), own.parameters))
         plain = lines._replace(springs=None)
-        # Unknown entries are entries of C, which is R without springs. Cross terms of T = 1 - Z R would make columns by Q
-        # nearly dependent, and projections slow.
+        # Unknown entries are entries of C, which is R without springs. Cross terms of T = 1 - Z R would make the
+        # columns by Q nearly dependent, and projections slow.
         has_springs = not (own.has_cross_terms or unknown.any())
         lines = plain.with_springs() if has_springs else plain
         if start is not None:
