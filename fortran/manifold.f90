@@ -135,8 +135,8 @@ contains
   end subroutine project_on_joint
 
   !> The expected FRFs near ones that fit a joint, if entries of M = (Y_B + K*^-1)^-1 = Z T' + T Q T' are normal about
-  !> 0 with given deviations, and the error of the FRFs is `share_of_noise` times their noise: least squares of both by one
-  !> Gauss-Newton step. Off-diagonal entries of T are not in the prior.
+  !> 0 with given deviations, and the error of the FRFs is `share_of_noise` times their noise: least squares of both by
+  !> one Gauss-Newton step. Off-diagonal entries of T are not in the prior.
   !> spread_m     standard deviations of the entries of M, shape (n, n, n_freq), > 0, N/m
   !> spring, inverse_std, whitening, r, h, q    as in `project_on_joint`
   subroutine expect_on_joint(transposed, reciprocal, share_of_noise, spread_m, spring, inverse_std, whitening, r, h, &

@@ -4,8 +4,8 @@
 !> A' = 1 - R Q, T = 1 - Z R, T' = 1 - R Z. R = (K* + Z)^-1 is the compliance of the joint in parallel with reference
 !> springs Z, which are given; H and Q are free. Without springs Z = 0, T = 1, and R is the compliance of the joint.
 !> Entries of gamma that are used are counted jk row by row, kj column by column, kk and jj row by row: of a reciprocal
-!> structure without kj and what is below the diagonals. Free entries of H, Q and R are the upper triangle row by row, or
-!> all.
+!> structure without kj and what is below the diagonals. Free entries of H, Q and R are the upper triangle row by row,
+!> or all.
 !>
 !> A column of derivatives has an element for each entry of gamma. Many of its elements are zero; `groups` are the runs
 !> of entries that have the same columns not zero, so that products of columns leave the zeros out.
