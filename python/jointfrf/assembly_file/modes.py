@@ -12,7 +12,7 @@ import numpy as np
 
 from jointfrf.cases.keys import MAP, read_frf_file
 from jointfrf.cases.structure import Structure, SubstructureKeys
-from jointfrf.dofs import direction_names
+from jointfrf.dofs import direction_names, similar_dof
 from jointfrf.io.fe.nodes import read_dof_names, read_nodes
 from jointfrf.io.modes import ModesFile, read_modes
 from jointfrf.io.units import UnitSystemName, model_units
@@ -54,7 +54,7 @@ class ModalStructure(Structure):
         number = {dof: i for i, dof in enumerate(self.modes.dofs)}
         missing = [dof for dof in dofs if dof not in number]
         if missing:
-            raise ValueError(f"there is no DOF {missing[0]!r}")
+            raise ValueError(f"there is no DOF {missing[0]!r}{similar_dof(missing[0], number)}")
         return [number[dof] for dof in dofs]
 
     def receptance(self, freq_hz: FloatArray, points: Sequence[str]) -> ComplexArray:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from scipy import linalg, sparse
 from scipy.sparse import linalg as sparse_linalg
 
+from jointfrf.dofs import similar_dof
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_dofs, as_names, as_real, check_choice, check_type
 from jointfrf.laws.law_joint import LawJoint
@@ -79,7 +80,8 @@ class Model:
         """
         for name in as_names("names", names):
             if name not in self.dofs:
-                raise ValueError(f"the model has no DOF {name!r}; it has {self.dofs[0]!r} to {self.dofs[-1]!r}")
+                hint = similar_dof(name, self.dofs) or f"; use one of {self.dofs[0]!r} to {self.dofs[-1]!r}"
+                raise ValueError(f"the model has no DOF {name!r}{hint}")
         found = [self.dofs.index(name) for name in names]
         return found[0] if len(found) == 1 else found
 
