@@ -134,7 +134,7 @@ class MatricesKeys(SubstructureKeys, tag="matrices"):
         found, dofs, held = _without_empty(found, dofs)
         found = _in_si(found, dofs, units)
         model = PointModel(
-            found["stiffness"], found["mass"], _marked(dofs, file.turned), found.get("damping"),
+            found["stiffness"], found["mass"], file.named(dofs), found.get("damping"),
             found.get("structural_damping"), self.loss_factor, places=_places(dofs, file, units),
         )  # fmt: skip
         patches = [
@@ -230,15 +230,6 @@ def _in_si(
     return {name: sparse.csr_array(units.scale(power[name]) * (by_dof @ one @ by_dof)) for name, one in found.items()}
 
 
-def _marked(dofs: tuple[str, ...], turned: Sequence[str]) -> tuple[str, ...]:
-    """Return names of DOFs; those of nodes with directions of their own say so."""
-    own = set(turned)
-    if not own:
-        return dofs
-    parts = (dof.rpartition(":") for dof in dofs)
-    return tuple(f"{node}:local_{way}" if node in own else f"{node}:{way}" for node, _, way in parts)
-
-
 def _places(dofs: Sequence[str], file: NodeFile, units: ModelUnits) -> dict[str, FloatArray]:
     """Return where the nodes of the DOFs are, m."""
     length = 1.0 if file.is_si else units.length
@@ -255,7 +246,7 @@ def _about(
     text = f"{names} ({program + ', ' if program else ''}{units.name})"
     halves = sorted({one.completed for one in stored.values() if one.completed})
     if halves:
-        text += f"; the {' and the '.join(halves)} triangle is stored, the other one was filled in"
+        text += f"; {' and '.join(halves)} is stored, the rest was completed by symmetry"
     text += f"; {held} DOFs without any entry are held and left out" if held else ""
     return text + (f"; {turned} nodes have directions of their own, named local_x" if turned else "")
 

@@ -14,7 +14,8 @@ from jointfrf.dofs import DIRECTIONS
 from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit, check_file, damage_named, head_of
 from jointfrf.io.npz_file import npz_fields
-from jointfrf.io.uff_file import UniversalFile
+from jointfrf.io.uff_axes import node_axes
+from jointfrf.io.uff_file import UniversalFile, name_some
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["ModesFile", "read_modes"]
@@ -34,8 +35,8 @@ _KNOWN = {
 }
 #: Modes below are rigid motions, Hz: FE programs give them as rounding of zero.
 _RIGID_HZ = 1e-2
-#: Columns of a number; words of a value of a node by the kind of data.
-_COLUMNS, _WORDS = 13, {2: 1, 4: 1, 5: 2, 6: 2}
+#: Columns of a whole and of a real number where no blanks are between them; words of a value by the kind of data.
+_WHOLE, _REAL, _WORDS = 10, 13, {2: 1, 4: 1, 5: 2, 6: 2}
 #: Normal modes, complex modes by displacement.
 _NORMAL, _COMPLEX = 2, 3
 #: The driving point of a mode must not move less than this share of where it moves most.
@@ -155,6 +156,7 @@ def _of_universal(file: UniversalFile) -> ModesFile:
     if len(kinds) > 1 or any(set(mode["shape"]) != set(dofs) for mode in modes):
         raise file.error("holds modes of different kinds, or of different nodes")
     shapes = np.array([[mode["shape"][dof] for mode in modes] for dof in dofs])
+    dofs, shapes = _in_global_axes(file, dofs, shapes)
     scale = np.array([mode["scale"] for mode in modes])
     frequency, damping = (np.array([mode[name] for mode in modes]) for name in ("frequency", "damping"))
     more: dict[str, Any] = {"dofs": dofs, "notes": file.notes(), "has_nodes": bool(file.datasets(15, 2411))}
@@ -163,17 +165,38 @@ def _of_universal(file: UniversalFile) -> ModesFile:
     return ModesFile(frequency, damping, shapes, scale=scale.astype(complex), **more)
 
 
+def _in_global_axes(
+    file: UniversalFile, dofs: tuple[str, ...], shapes: NDArray[Any]
+) -> tuple[tuple[str, ...], NDArray[Any]]:
+    """Turn the motions of nodes that have axes of their own; where these are unknown, directions are ``local_x``."""
+    found, names = shapes.copy(), list(dofs)
+    number = {dof: i for i, dof in enumerate(dofs)}
+    axes = node_axes(file, {int(dof.partition(":")[0]) for dof in dofs})
+    for node, turn in axes.items():
+        for three in (DIRECTIONS[:3], DIRECTIONS[3:]):
+            own = [number[f"{node}:{way}"] for way in three if f"{node}:{way}" in number]
+            if turn is None:
+                names = [f"{node}:local_{three[own.index(i)]}" if i in own else name for i, name in enumerate(names)]
+            elif own:
+                found[own] = turn.T @ shapes[own]
+    lost = [node for node, turn in axes.items() if turn is None]
+    if lost:
+        what = f"directions at {name_some('node', lost)} are local, named local_x, ...: their axes are not known"
+        file.note(what, *file.datasets(15, 2411))
+    return tuple(names), found
+
+
 def _dataset_55(records: list[str]) -> dict[str, Any] | None:
     """Return one mode; None where the dataset holds something else."""
-    _, kind, _, _, data, values = _integers(records[5])
+    _, kind, _, _, data, values = _integers(records[5])[:6]
     words = _numbers(records[7])
     return _mode(kind, words[:4], words[:4]) | {"shape": _shape(records[8:], data, values)} if _is_mode(kind) else None
 
 
 def _dataset_2414(records: list[str]) -> dict[str, Any] | None:
     """Return one mode; None where the dataset holds something else, or not at nodes."""
-    _, kind, _, _, data, values = _integers(records[8])
-    if not _is_mode(kind) or int(records[2][:10]) != 1:
+    _, kind, _, _, data, values = _integers(records[8])[:6]
+    if not _is_mode(kind) or _integers(records[2])[0] != 1:
         return None
     _, frequency, _, *normal = _numbers(records[11])
     return _mode(kind, [frequency, *normal], _numbers(records[12])) | {"shape": _shape(records[13:], data, values)}
@@ -211,7 +234,7 @@ def _shape(records: list[str], data: int, values: int) -> dict[str, complex | fl
     shape: dict[str, complex | float] = {}
     count, at = values * _WORDS[data], 0
     while at < len(records):
-        node, at = int(records[at][:10]), at + 1
+        node, at = _integers(records[at])[0], at + 1
         entry: list[float] = []
         while len(entry) < count:
             entry += _numbers(records[at])
@@ -224,12 +247,23 @@ def _shape(records: list[str], data: int, values: int) -> dict[str, complex | fl
 
 
 def _integers(line: str) -> list[int]:
-    return [int(line[10 * i : 10 * i + 10]) for i in range(6)]
+    return [int(word) for word in _words(line, _WHOLE, int)]
 
 
 def _numbers(line: str) -> list[float]:
-    line = line.rstrip()
-    return [float(line[at : at + _COLUMNS]) for at in range(0, len(line), _COLUMNS)]
+    return [float(word) for word in _words(line, _REAL, float)]
+
+
+def _words(line: str, width: int, kind: type[int | float]) -> list[str]:
+    """Return the numbers of a line, between blanks; by columns where numbers touch."""
+    words = line.split()
+    try:
+        for word in words:
+            kind(word)
+    except ValueError:
+        text = line.rstrip()
+        return [text[at : at + width] for at in range(0, len(text), width)]
+    return words
 
 
 def _of_arrays(path: Path, fields: Mapping[str, NDArray[Any]]) -> ModesFile:

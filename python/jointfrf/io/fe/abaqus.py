@@ -37,7 +37,7 @@ def _read_calculix(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
     found = _triplets(path, limit, 3)
     rows, columns = found[:, 0].astype(np.int64) - 1, found[:, 1].astype(np.int64) - 1
     n = int(max(rows.max(), columns.max())) + 1
-    matrix, completed = matrix_of_entries(path, rows, columns, found[:, 2], n, limit, symmetric=True)
+    matrix, completed = matrix_of_entries(path, rows, columns, found[:, 2], n, limit, symmetric="possible")
     return StoredMatrix(matrix, program="CalculiX", completed=completed)
 
 
@@ -80,7 +80,7 @@ def _read_abaqus(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
         return matrix_of_labels(path, found[:, :4].astype(np.int64), found[:, 4], limit, "Abaqus")
     rows, cols = found[:, 0].astype(np.int64) - 1, found[:, 1].astype(np.int64) - 1
     n = int(max(rows.max(), cols.max())) + 1
-    matrix, completed = matrix_of_entries(path, rows, cols, found[:, 2], n, limit, symmetric=True)
+    matrix, completed = matrix_of_entries(path, rows, cols, found[:, 2], n, limit, symmetric="possible")
     return StoredMatrix(matrix, None, "Abaqus", completed)
 
 

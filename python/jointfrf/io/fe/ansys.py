@@ -14,7 +14,7 @@ from scipy import sparse
 from jointfrf.errors import FileContentError
 from jointfrf.extras import import_extra
 from jointfrf.files import ReadLimit
-from jointfrf.io.fe.matrix_format import MatrixFormat, StoredMatrix, dof_name, matrix_of_entries
+from jointfrf.io.fe.matrix_format import MatrixFormat, StoredMatrix, Symmetry, dof_name, matrix_of_entries
 
 __all__ = ["ANSYS_FULL", "HARWELL_BOEING"]
 
@@ -34,7 +34,7 @@ def _read_full(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
     entries = sparse.coo_array(chosen)
     matrix, completed = matrix_of_entries(
         path, entries.row.astype(np.int64), entries.col.astype(np.int64), entries.data, chosen.shape[0], limit,
-        symmetric=True,
+        symmetric="possible",
     )  # fmt: skip
     dofs = tuple(dof_name(node, number + 1) for node, number in named.tolist())
     return StoredMatrix(matrix, dofs, "Ansys", completed)
@@ -86,9 +86,9 @@ def _read_hb(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
     if begins[0] != 0 or begins[-1] != entries or (np.diff(begins) < 0).any():
         raise ValueError("the beginnings of its columns do not fit the number of its entries")
     of_column = np.repeat(np.arange(columns), np.diff(begins))
-    is_symmetric = third[1] in "Ss"
+    symmetric: Symmetry = "stated" if third[1] in "Ss" else "no"
     matrix, completed = matrix_of_entries(
-        path, places.astype(np.int64) - 1, of_column, values, rows, limit, symmetric=is_symmetric
+        path, places.astype(np.int64) - 1, of_column, values, rows, limit, symmetric=symmetric
     )
     return StoredMatrix(matrix, None, "Ansys", completed)
 

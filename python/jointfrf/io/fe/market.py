@@ -42,12 +42,12 @@ def _read(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
             return StoredMatrix(sparse.csr_array(found.reshape(columns, rows).T))
         whole = np.zeros((rows, rows))
         whole.T[np.triu_indices(rows)] = found[:, 0]  # the lower triangle by columns
-        return StoredMatrix(sparse.csr_array(whole + np.tril(whole, -1).T), completed="lower")
+        return StoredMatrix(sparse.csr_array(whole + np.tril(whole, -1).T), completed="the lower triangle")
     places = found[:, :2].astype(np.int64)
     if (places != found[:, :2]).any():
         raise ValueError("numbers of rows and columns must be whole numbers")
     matrix, completed = matrix_of_entries(
-        path, places[:, 0] - 1, places[:, 1] - 1, found[:, 2], rows, limit, symmetric=is_half
+        path, places[:, 0] - 1, places[:, 1] - 1, found[:, 2], rows, limit, symmetric="stated" if is_half else "no"
     )
     return StoredMatrix(matrix, completed=completed)
 
