@@ -25,11 +25,13 @@ from jointfrf.models.beam import BeamElement, End, beam
 from jointfrf.models.matrices import is_symmetric
 from jointfrf.models.model import Ground, chain
 from jointfrf.models.points import Coupling, PointModel, PointPatch, couple_points
-from jointfrf.solids.brick_beam import Face, Hole, Preset, brick_beam
+from jointfrf.solids.brick_beam import Face, Hole, Preset, beam_divisions, brick_beam
 from jointfrf.toml.declared import Keys, NotNegative, Positive, key, read_keys
 from jointfrf.toml.table import TomlTable
 
 __all__ = [
+    "BEAM_ELEMENT",
+    "BRICK",
     "PRESET",
     "SUBSTRUCTURES",
     "MatricesKeys",
@@ -264,6 +266,8 @@ def _unsymmetric(path: Path, matrix: sparse.csr_array) -> str:
     return text + ("; it holds one triangle only" if is_triangle else "")
 
 
+#: Bytes of memory of a beam element and of a brick, names of DOFs and assembly included.
+BEAM_ELEMENT, BRICK = 2_000, 25_000
 #: A key of all models of bricks.
 PRESET = key("Elements: `seed` as in the thesis (C3D8R), `accurate` with incompatible modes (C3D8I).", example="seed")
 
@@ -308,6 +312,7 @@ class BeamKeys(SubstructureKeys, tag="beam"):
         is_flexible = self.element == "shear-flexible"
         if is_flexible and self.poisson is None:
             raise self.missing(["poisson"], "shear-flexible elements have one")
+        self.table.check_stated("elements", BEAM_ELEMENT * self.elements)
         model = self.build(lambda: beam(
             self.length, self.elements, youngs_modulus=self.youngs_modulus, density=self.density, width=self.width,
             height=self.height, ends=self.ends, element=self.element, axial=self.axial,
@@ -351,6 +356,9 @@ class BrickBeamKeys(SubstructureKeys, MaterialKeys, tag="brick-beam"):
 
     def structure(self, freq_hz: FloatArray) -> Structure:
         """Return the structure."""
+        default = self.build(lambda: beam_divisions(self.length, self.height, holed=self.hole is not None))
+        nx, ny, nz = self.divisions or default
+        self.table.check_stated("divisions" if self.divisions else "length", BRICK * nx * ny * nz)
         one = self.hole
         hole = None if one is None else Hole(one.position, one.radius, one.patch_radius, one.face)
         material = self.material

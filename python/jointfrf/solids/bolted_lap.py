@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Final, Literal, get_args
 
@@ -26,6 +27,7 @@ __all__ = [
     "BoltedLap",
     "LapDivisions",
     "bolted_lap",
+    "lap_bricks",
     "preload_force",
 ]
 
@@ -313,6 +315,12 @@ def bolted_lap(
         axis=np.array([0.0, 0.0, start + overlap / 2]),
         preset=preset,
     )
+
+
+def lap_bricks(lengths: Sequence[float], height: float) -> float:
+    """Return about how many bricks beams of these lengths take with the default divisions."""
+    bricks = LapDivisions()
+    return bricks.across * bricks.layers * _PER_HEIGHT * sum(lengths) / height
 
 
 def _check_dimensions(

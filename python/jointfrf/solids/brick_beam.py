@@ -15,7 +15,7 @@ from jointfrf.solids.brick import Formulation, Material
 from jointfrf.solids.mesh import NEAR, Mesh, Plan, extrude, holed_rectangle, join_plans, rectangle
 from jointfrf.solids.solid import Patch, SolidModel, solid_model
 
-__all__ = ["PRESETS", "Face", "Hole", "Preset", "brick_beam", "holed_plan"]
+__all__ = ["PRESETS", "Face", "Hole", "Preset", "beam_divisions", "brick_beam", "holed_plan"]
 
 Preset = Literal["seed", "accurate"]
 Face = Literal["top", "bottom"]
@@ -130,8 +130,7 @@ def brick_beam(
     for what, places in (("sections", sections), ("observed", observed)):
         if not isinstance(places, Mapping | None):
             raise TypeError(f"{what} must map names to places, not {type(places).__name__}")
-    nx, ny, per_height = _PLAIN if hole is None else _HOLED
-    nz = max(1, round(length / height * per_height))
+    nx, ny, nz = beam_divisions(length, height, holed=hole is not None)
     if divisions is not None:
         if np.shape(divisions) != (3,):
             raise ValueError(f"divisions must be three numbers, along x, y and z, not {reprlib.repr(divisions)}")
@@ -159,6 +158,12 @@ def brick_beam(
         observed=seen,
         clamped=np.concatenate([np.zeros(0, int), *clamped]),
     )
+
+
+def beam_divisions(length: float, height: float, *, holed: bool) -> tuple[int, int, int]:
+    """Return the default numbers of bricks along x, y and z."""
+    nx, ny, per_height = _HOLED if holed else _PLAIN
+    return nx, ny, max(1, round(length / height * per_height))
 
 
 def _mesh(length: float, width: float, height: float, hole: Hole | None, divisions: tuple[int, int, int]) -> Mesh:
