@@ -418,17 +418,25 @@ def _masses(
     values = set(mass.values())
     if len(values) > 1:
         raise ValueError(f"a point mass is the same in all directions: those of {', '.join(mass)} differ")
+    from jointfrf.io.cards import card_integer, card_real  # readers of files take their time to import
+
     half = values.pop() / 2
     element, number = numbers
     lines = [f"{comment} half of the mass of the joint on each node, in all directions, written by jointfrf"]
     for i, node in enumerate(nodes):
-        own = element + i
+        own = card_integer("element", element + i)
         if program in ("abaqus", "calculix"):
             name = f"JOINT{number}_M{i + 1}"
-            lines += [f"*ELEMENT, TYPE=MASS, ELSET={name}", f"{own}, {node}", f"*MASS, ELSET={name}", f"{half:.13E}"]
+            lines += [f"*ELEMENT, TYPE=MASS, ELSET={name}", f"{own}, {node}", f"*MASS, ELSET={name}", card_real(half)]
         elif program == "nastran":
-            lines += [f"CONM2*  {own:16d}{node:16d}{0:16d}{half:16.9E}", "*"]
+            lines += [f"CONM2*  {own:16d}{node:16d}{0:16d}{card_real(half, 16, ''):>16}", "*"]
         else:
-            lines += [f"ET,{number + 50 + i},MASS21,,,2", f"R,{number + 50 + i},{half:.13E}",
-                      f"TYPE,{number + 50 + i}", f"REAL,{number + 50 + i}", f"E,{node}"]  # fmt: skip
+            kind = card_integer("number", number + 50 + i)
+            lines += [
+                f"ET,{kind},MASS21,,,2",
+                f"R,{kind},{card_real(half)}",
+                f"TYPE,{kind}",
+                f"REAL,{kind}",
+                f"E,{node}",
+            ]
     return "\n".join(lines) + "\n"
