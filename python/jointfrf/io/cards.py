@@ -507,8 +507,9 @@ def card_real(value: float, columns: int = 20, letter: str = "E") -> str:
 
     Examples
     --------
+    >>> from jointfrf.io.cards import card_real
     >>> card_real(6e5), card_real(-6e5, 16, ""), card_real(-1.25e-120, 16, "")
-    ('6.0000000000000E+05', '-6.0000000000000+5', '-1.2500000000-120')
+    ('6.0000000000000E+05', '-6.00000000000+5', '-1.250000000-120')
     """
     if not np.isfinite(value) or 0 < abs(value) < np.finfo(np.float64).tiny:
         raise ValueError(f"a card cannot contain {value:g}; check joint, units and positions for a number out of range")
