@@ -259,11 +259,11 @@ def _unsymmetric(path: Path, matrix: sparse.csr_array) -> str:
     worst = int(np.argmax(abs(difference.data)))
     i, j = int(difference.row[worst]), int(difference.col[worst])
     text = (
-        f"{path} must hold a symmetric matrix: entry ({i + 1}, {j + 1}) is {matrix[i, j]:g}, "
+        f"{path} must contain a symmetric matrix: entry ({i + 1}, {j + 1}) is {matrix[i, j]:g}, "
         f"({j + 1}, {i + 1}) is {matrix[j, i]:g}"
     )
     is_triangle = sparse.triu(matrix, 1).count_nonzero() == 0 or sparse.tril(matrix, -1).count_nonzero() == 0
-    return text + ("; it holds one triangle only" if is_triangle else "")
+    return text + ("; it contains one triangle only" if is_triangle else "")
 
 
 #: Bytes of memory of a beam element and of a brick, names of DOFs and assembly included.

@@ -128,9 +128,7 @@ class _Link(NamedTuple):
         if direction < 3:
             return self.nodes[side], direction + 1
         if len(self.nodes) < 4:
-            raise ValueError(
-                "rotation_nodes must name the ROT NODEs of the two rigid bodies: calculix has rotations nowhere else"
-            )
+            raise ValueError("calculix has rotations at ROT NODEs of rigid bodies only; name the two in rotation_nodes")
         return self.nodes[2 + side], direction - 2
 
     def comments(self, mark: str) -> list[str]:
@@ -198,11 +196,11 @@ def table_cards(
     """
     check_choice("program", program, get_args(CardFormat))
     if program not in ("abaqus", "nastran"):
-        raise ValueError(f"{program} has no tables over frequency: freq_hz names one frequency instead")
+        raise ValueError(f"{program} has no tables over frequency; name one frequency by freq_hz")
     if options.get("full_matrix", False):
-        raise ValueError("full_matrix is not for tables over frequency: matrices have none")
+        raise ValueError("full_matrix has no tables over frequency; leave one of them out")
     if freq_hz.size < 2 or not (freq_hz[0] > 0 and (np.diff(freq_hz) > 0).all()):
-        raise ValueError("table_hz must hold at least two frequencies above 0 Hz that increase")
+        raise ValueError("table_hz must contain at least two frequencies above 0 Hz that increase")
     lines = np.stack([k_joint.real, k_joint.imag / (2 * np.pi * freq_hz[:, None, None])])
     if not options.get("damping", True):
         lines[1] = 0
@@ -225,9 +223,9 @@ def _text(program: CardFormat, link: _Link, options: CardOptions) -> str:
     """Write the elements of a joint, and what follows its nodes."""
     is_connector = options.get("connector", False)
     if is_connector and program != "abaqus":
-        raise ValueError(f"connector elements are for abaqus, not for {program}: leave connector out")
+        raise ValueError(f"connector elements are for abaqus, not for {program}; leave connector out")
     if is_connector and options.get("full_matrix", False):
-        raise ValueError("full_matrix and connector exclude each other: name one of them")
+        raise ValueError("full_matrix and connector exclude each other; name one of them")
     is_matrix = options.get("full_matrix", False) or _coupled(link)
     if program == "calculix":
         lines = _calculix(link)
@@ -264,9 +262,9 @@ def _link(
     turning_nodes = options.get("rotation_nodes")
     turning = () if turning_nodes is None else _two_nodes("rotation_nodes", turning_nodes)
     if program == "calculix" and options.get("full_matrix", False):
-        raise ValueError("full_matrix is not for calculix, which reads no matrices: leave it out")
+        raise ValueError("full_matrix is not for calculix, which reads no matrices; leave it out")
     if turning and program != "calculix":
-        raise ValueError(f"rotation_nodes are for calculix: the nodes of {program} have rotations of their own")
+        raise ValueError(f"rotation_nodes are for calculix, not for {program}; leave them out")
     element, number = (
         card_integer("element", options.get("element", 1)),
         card_integer("number", options.get("number", 1)),
@@ -310,8 +308,8 @@ def _geometry(options: CardOptions, units: ModelUnits) -> tuple[FloatArray | Non
     unit = units.words.partition(",")[0]
     if longest > _LONGEST_ARM:
         raise ValueError(
-            f"a node lies {longest / units.length:.4g} {unit} from the reference point of the joint: positions and "
-            f"points are in {unit}, the unit of length of {units.name}"
+            f"a node lies {longest / units.length:.4g} {unit} from the reference point of the joint; give positions "
+            f"and points in {unit}, as in {units.name}"
         )
     same = np.allclose(ends[0], ends[1], rtol=0, atol=_NO_ARM / units.length)
     texts = [f"({', '.join(f'{value:.6g}' for value in end + 0.0)}) {unit}" for end in ends]
@@ -331,7 +329,7 @@ def _faces(
     first, second = (tuple(card_integer("faces", node) for node in as_nodes("faces", own)) for own in given)
     twice = (set(first) & set(second)) | ({*first, *second} & set(nodes))
     if twice:
-        raise ValueError(f"faces must hold each node once, and not the nodes of the joint, as {min(twice)}")
+        raise ValueError(f"faces must contain each node once, and not the nodes of the joint, as {min(twice)}")
     return first, second
 
 
@@ -561,11 +559,11 @@ def _abaqus_connector(link: _Link) -> list[str]:
     The relative motion of the joint's point is that of node K, moved by the arm of K as K turns against J.
     """
     if not link.has_one_point:
-        raise ValueError("a connector element needs one reference point of both sides of the joint: name one in points")
+        raise ValueError("a connector element needs one reference point of both sides of the joint; name one in points")
     if link.table is None and link.hysteretic.any():
         raise ValueError(
-            "a connector element holds no hysteretic damping: table_hz= gives a table over frequency that does, "
-            "damping=False leaves damping out"
+            "a connector element has no hysteretic damping; write a table over frequency by table_hz=, or leave "
+            "damping out with damping=False"
         )
     move = rigid_offset(DIRECTIONS, link.arms[1])
     name, j, k = f"JOINT{link.number}", *link.nodes[:2]
@@ -610,7 +608,9 @@ def _abaqus_matrices(link: _Link) -> list[str]:
 def _calculix(link: _Link) -> list[str]:
     """Springs that add up to the matrix: SPRING2 for each entry off the diagonal, SPRING1 for what a row sums up to."""
     if link.damping.any() or link.hysteretic.any():
-        raise ValueError("calculix has no dashpot between DOFs and no complex spring: damping=False leaves damping out")
+        raise ValueError(
+            "calculix has no dashpot between DOFs and no complex spring; leave damping out with damping=False"
+        )
     whole = link.both_sides(link.stiffness)
     at = link.calculix_dof
     springs: list[tuple[list[tuple[int, int]], float]] = []
@@ -641,8 +641,8 @@ def _nastran_bush(link: _Link) -> list[str]:
     k, c, h = (matrix.diagonal() for matrix in link.matrices)
     if link.table is not None and (_coupled(link) or not link.has_one_point):
         raise ValueError(
-            "PBUSHT of nastran holds tables of single directions at one point: terms between directions, or reference "
-            "points that are apart, have none"
+            "PBUSHT of nastran has tables of single directions at one point; leave out terms between directions and "
+            "reference points that are apart"
         )
     if ((k == 0) & (h != 0)).any():
         return _nastran_matrices(link)  # GE is a multiple of K
@@ -724,7 +724,7 @@ def _nastran_matrices(link: _Link) -> list[str]:
     names = {"K2GG": f"KJ{link.number}", "B2GG": f"BJ{link.number}", "K42GG": f"HJ{link.number}"}
     used = [(command, names[command], m) for command, m in zip(names, link.matrices, strict=True) if m.any()]
     if any(len(name) > 8 for _, name, _ in used):
-        raise ValueError("number must have at most six digits: it is part of a name of eight characters")
+        raise ValueError("number must have at most six digits, as a part of a name of eight characters")
     lines = [*link.comments("$"), "$ case control: " + ", ".join(f"{command} = {name}" for command, name, _ in used)]
     for _, name, matrix in used:
         lines.append(f"DMIG    {name:<8}{0:8d}{6:8d}{2:8d}{0:8d}")
@@ -742,7 +742,7 @@ def _nastran_matrices(link: _Link) -> list[str]:
 def _ansys(link: _Link) -> list[str]:
     """MATRIX27 elements: the upper triangle row by row, UX ... ROTZ of node j, then of node k."""
     if link.hysteretic.any():
-        raise ValueError("MATRIX27 of ansys has no hysteretic damping: damping=False leaves damping out")
+        raise ValueError("MATRIX27 of ansys has no hysteretic damping; leave damping out with damping=False")
     lines = [*link.comments("!"), "! directions are those of the nodal coordinate systems"]
     i = 0
     for option, matrix in ((4, link.stiffness), (5, link.damping)):

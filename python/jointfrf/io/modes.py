@@ -119,15 +119,15 @@ def _check(path: Path, found: ModesFile) -> None:
     """Raise an error for numbers that are none, or damping that is not that of a structure."""
     parts = [one for one in vars(found).values() if isinstance(one, np.ndarray) and one is not found.damping]
     if not all(np.isfinite(one).all() for one in parts) or (found.frequency < 0).any():
-        raise FileContentError(f"{path} holds modes with numbers that are not finite, or negative frequencies")
+        raise FileContentError(f"{path} contains modes with numbers that are not finite, or negative frequencies")
     if (abs(found.damping) >= 1).any() or (found.damping < 0).any():
-        raise FileContentError(f"{path} holds modes with damping ratios that are not between 0 and 1")
+        raise FileContentError(f"{path} contains modes with damping ratios that are not between 0 and 1")
     for name, scale in (("modal mass", found.modal_mass), ("modal A", found.scale)):
         if scale is not None and not scale.all():
             number = int(np.argmin(abs(scale))) + 1
             raise FileContentError(f"{path}: mode {number} has no {name}, so that its shape has no scale")
     if found.modal_mass is not None and (found.modal_mass < 0).any():
-        raise FileContentError(f"{path} holds negative modal masses")
+        raise FileContentError(f"{path} contains negative modal masses")
 
 
 def _of_universal(file: UniversalFile) -> ModesFile:
@@ -150,11 +150,11 @@ def _of_universal(file: UniversalFile) -> ModesFile:
             mode["scale"] *= force * length
         modes.append(mode)
     if not modes:
-        raise file.error("holds no modes: no dataset 55 or 2414 of normal or complex modes")
+        raise file.error("contains no modes: no dataset 55 or 2414 of normal or complex modes")
     kinds = {mode["kind"] for mode in modes}
     dofs = tuple(modes[0]["shape"])
     if len(kinds) > 1 or any(set(mode["shape"]) != set(dofs) for mode in modes):
-        raise file.error("holds modes of different kinds, or of different nodes")
+        raise file.error("contains modes of different kinds, or of different nodes; write one kind for all nodes")
     shapes = np.array([[mode["shape"][dof] for mode in modes] for dof in dofs])
     dofs, shapes = _in_global_axes(file, dofs, shapes)
     scale = np.array([mode["scale"] for mode in modes])
@@ -282,12 +282,14 @@ def _of_arrays(path: Path, fields: Mapping[str, NDArray[Any]]) -> ModesFile:
             shapes, reference = np.asarray(own["shapes"]), None
             if own["modal_mass"] is None:
                 raise FileContentError(
-                    f"{path} holds shapes without modal_mass: shapes of an operational analysis have no scale, those "
-                    "of unit modal mass need modal_mass = 1 for each mode"
+                    f"{path} contains shapes without modal_mass, so without a scale; add modal_mass, 1 for each mode "
+                    "of unit modal mass"
                 )
             mass, scale = np.broadcast_to(np.asarray(own["modal_mass"], float), (count,)).copy(), None
         else:
-            raise FileContentError(f"{path} must hold residues, or shapes and modal_mass; it holds {', '.join(fields)}")
+            raise FileContentError(
+                f"{path} must contain residues, or shapes and modal_mass; it contains {', '.join(fields)}"
+            )
     if shapes.ndim != 2 or shapes.shape[1] != count:
         size = " x ".join(map(str, shapes.shape))
         raise FileContentError(f"{path}: shapes or residues must be DOFs x {count} modes, not {size}")
@@ -301,12 +303,12 @@ def _frequencies(path: Path, own: Mapping[str, NDArray[Any] | None]) -> tuple[Fl
     if own["poles"] is not None:
         poles = np.asarray(own["poles"], complex).ravel()
         if (poles.imag < 0).any():
-            raise FileContentError(f"{path} must hold poles of the upper half plane only, in rad/s")
+            raise FileContentError(f"{path} must contain poles of the upper half plane only, in rad/s")
         size = np.where(poles == 0, 1, abs(poles))
         hertz: FloatArray = np.asarray(abs(poles) / (2 * np.pi), float)
         return hertz, np.asarray(-poles.real / size, float)
     if own["frequency"] is None:
-        raise FileContentError(f"{path} must hold poles, or frequencies and damping")
+        raise FileContentError(f"{path} must contain poles, or frequencies and damping")
     frequency: FloatArray = np.asarray(own["frequency"], float).ravel()
     damping = own["damping"]
     none = np.full(frequency.size, np.nan)
@@ -324,7 +326,7 @@ def _factors(path: Path, residues: ComplexArray, reference: NDArray[Any] | None)
         columns = residues[:, at, np.arange(residues.shape[2])]
         return columns / np.sqrt(columns[at, np.arange(at.size)]), None
     if reference is None or np.size(reference) != 1:
-        raise FileContentError(f"{path} must hold driving_point, which of its rows is that of the force, from 0")
+        raise FileContentError(f"{path} must contain driving_point, the row of the force counted from 0")
     point = int(np.ravel(reference)[0])
     if not 0 <= point < len(residues):
         raise FileContentError(f"{path}: driving_point must be one of its {len(residues)} rows, from 0")

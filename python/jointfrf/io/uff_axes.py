@@ -245,8 +245,8 @@ def global_channels(
         file.note(f"local directions at {name_some('node', sorted(turned))} are turned to global ones", *places)
     if lost:
         file.note(
-            f"directions at {name_some('node', sorted(lost))} are local, so their channels are left out; measure all "
-            "three, or set their displacement system to 0 and state directions in a channel table",
+            f"directions at {name_some('node', sorted(lost))} are local and left out; measure all three, or set "
+            "displacement systems to 0 and give a channel table",
             *places,
         )
     whole = np.stack(rows, axis=1) if rows else h[:, :0]

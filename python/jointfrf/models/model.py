@@ -273,10 +273,10 @@ def _constants(joint: Joint | LawJoint) -> tuple[Joint, FloatArray]:
     if isinstance(joint, Joint):
         return joint, np.zeros(len(joint.dofs))
     if joint.rigid:
-        raise ValueError(f"joint: {', '.join(joint.rigid)} is rigid, which adds no spring to matrices: use couple")
+        raise ValueError(f"joint: {', '.join(joint.rigid)} is rigid, which adds no spring to matrices; use couple")
     varying = [type(law).__name__ for law in joint.laws.values() if law.constant_terms is None]
     if varying:
-        raise ValueError(f"joint: a {varying[0]} depends on frequency, which matrices do not: use couple")
+        raise ValueError(f"joint: a {varying[0]} depends on frequency, which matrices do not; use couple")
     springs = LawJoint(joint.laws, dofs=joint.dofs).constant_joint()
     return springs, np.array([joint.mass.get(dof, 0.0) for dof in joint.dofs])
 

@@ -403,8 +403,8 @@ def _check_quality(name: str, mesh: Mesh) -> None:
     if quality[worst] < _POOR:
         x, y, z = 1e3 * mesh.nodes[mesh.elements[worst]].mean(axis=0)
         raise ValueError(
-            f"divisions: a brick of {name} near x, y, z = {x:.3g}, {y:.3g}, {z:.3g} mm is badly shaped, with a scaled "
-            f"Jacobian of {quality[worst]:.2g} where at least {_POOR} is needed"
+            f"divisions: a brick of {name} near x, y, z = {x:.3g}, {y:.3g}, {z:.3g} mm has a scaled Jacobian of "
+            f"{quality[worst]:.2g}; change divisions to reach {_POOR}"
         )
 
 

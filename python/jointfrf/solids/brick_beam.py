@@ -205,8 +205,8 @@ def holed_plan(
     reach = (min(width / 2, position), min(width / 2, length - position), width / 2)
     if not max(radii) < min(reach):
         raise ValueError(
-            f"the hole at {1e3 * position:g} mm, with what surrounds it up to a radius of {1e3 * max(radii):g} mm, "
-            f"does not lie within the beam of {1e3 * length:g} x {1e3 * width:g} mm"
+            f"the hole at {1e3 * position:g} mm with its ring of radius {1e3 * max(radii):g} mm leaves the beam of "
+            f"{1e3 * length:g} x {1e3 * width:g} mm; move or shrink it"
         )
     plans = [holed_rectangle((position, 0.0), reach, radii, nx, _OUTER_LAYERS)]
     across = np.linspace(-width / 2, width / 2, nx + 1)

@@ -202,7 +202,7 @@ def _links(links: Iterable[BodyLink]) -> list[BodyLink]:
     for link in listed:
         check_type("links", link, BodyLink)
     if not listed:
-        raise ValueError("links must hold at least one BodyLink: nothing is connected")
+        raise ValueError("links must contain at least one BodyLink")
     return listed
 
 

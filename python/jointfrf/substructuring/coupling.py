@@ -201,7 +201,7 @@ def couple(
     j, k = as_dof_pairs(("dofs_a", dofs_a, n_a), ("dofs_b", dofs_b, n_b))
     if isinstance(k_joint, Joint | LawJoint):
         if freq_hz is None:
-            raise ValueError("freq_hz is needed: the stiffness of a joint depends on frequency")
+            raise ValueError("freq_hz is missing, on which the stiffness of a joint depends; give it")
         if len(k_joint.dofs) != j.size:
             raise ValueError(f"the joint has {len(k_joint.dofs)} DOFs, dofs_a and dofs_b name {j.size}")
         if isinstance(k_joint, LawJoint) and (k_joint.rigid or k_joint.mass):
@@ -371,10 +371,10 @@ def semm_standard_error(
     is_square = np.array_equal(expansion.outputs, expansion.inputs)
     if noise is None:
         if freq is None:
-            raise ValueError("freq_hz is needed to find the noise of h_measured: give it, or noise")
+            raise ValueError("freq_hz is missing, from which the noise of h_measured is found; give it, or noise")
         found = estimate_noise(freq, measured, reciprocal=is_square)
         if found.source == "none":
-            raise ValueError("h_measured does not show its noise, by too few lines or too little of it: give noise")
+            raise ValueError("h_measured has too few lines or too little noise to estimate it; give noise")
         variance = found.variance
     elif np.ndim(noise) == 0:
         variance = np.asarray(as_not_negative("noise", noise) ** 2 * abs(measured) ** 2, np.float64)

@@ -221,7 +221,7 @@ def test_a_rotation_by_another_name_is_suggested(bodies):
         ({"links": [jf.BodyLink(jf.Joint([1.0]), ["A/1:x"], ["A/1:x"])]}, "A/1:x is connected with itself"),
         ({"responses": ["A/1:x", "A/1:x"]}, "responses must name each DOF once"),
         ({"bodies": {"A/": jf.FreeBody(np.ones((25, 1, 1)), ["x"])}}, "names without '/'"),
-        ({"links": []}, "links must hold at least one BodyLink"),
+        ({"links": []}, "links must contain at least one BodyLink"),
         ({"freq_hz": [1.0]}, "body A must have 1 lines as freq_hz, not 25"),
     ],
 )

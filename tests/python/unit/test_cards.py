@@ -367,17 +367,17 @@ def test_text_holds_the_joint(joint, program, options, reader, digits):
 @pytest.mark.parametrize(
     ("joint", "program", "options", "message"),
     [
-        (COUPLED, "abaqus", {"connector": True}, "a connector element holds no hysteretic damping: table_hz= gives"),
+        (COUPLED, "abaqus", {"connector": True}, "a connector element has no hysteretic damping; write a table"),
         (DIAGONAL, "nastran", {"connector": True}, "connector elements are for abaqus"),
         (WITHOUT_LOSS, "abaqus", {"connector": True, "full_matrix": True}, "exclude each other"),
         (WITHOUT_LOSS, "abaqus", {"connector": True, "positions": [[0, 0, 0], [1, 0, 0]],
                                   "points": [[0, 0, 0], [0.5, 0, 0]]}, "needs one reference point"),
-        (COUPLED, "nastran", {"table_hz": TABLE_HZ}, "PBUSHT of nastran holds tables of single directions"),
+        (COUPLED, "nastran", {"table_hz": TABLE_HZ}, "PBUSHT of nastran has tables of single directions"),
         (DIAGONAL, "ansys", {"table_hz": TABLE_HZ}, "ansys has no tables over frequency"),
         (DIAGONAL, "calculix", {"table_hz": TABLE_HZ}, "calculix has no tables over frequency"),
         (DIAGONAL, "abaqus", {"table_hz": [0.0, 5.0]}, "at least two frequencies above 0 Hz"),
         (DIAGONAL, "abaqus", {"table_hz": [5.0]}, "at least two frequencies above 0 Hz"),
-        (DIAGONAL, "abaqus", {"table_hz": TABLE_HZ, "full_matrix": True}, "matrices have none"),
+        (DIAGONAL, "abaqus", {"table_hz": TABLE_HZ, "full_matrix": True}, "full_matrix has no tables"),
     ],
 )  # fmt: skip
 def test_what_no_connector_and_no_table_holds(joint, program, options, message):
@@ -429,7 +429,7 @@ def test_a_fit_is_exported_as_its_joint():
         (DIAGONAL, ("nastran", NODES), {"number": 1.5}, "number must be an integer"),
         (COUPLED, ("nastran", NODES), {"number": 1234567}, "at most six digits"),
         (DIAGONAL, ("calculix", NODES), {}, "damping=False"),
-        (DIAGONAL, ("calculix", NODES), {"damping": False}, "rotation_nodes must name the ROT NODEs"),
+        (DIAGONAL, ("calculix", NODES), {"damping": False}, "calculix has rotations at ROT NODEs"),
         (DIAGONAL, ("calculix", NODES), {"full_matrix": True}, "full_matrix is not for calculix"),
         (DIAGONAL, ("abaqus", NODES), {"rotation_nodes": (5, 6)}, "rotation_nodes are for calculix"),
         (DIAGONAL, ("ansys", NODES), {}, "no hysteretic damping"),
@@ -688,7 +688,7 @@ def test_nodes_at_the_joint_need_no_arms():
         ({"positions": [1e3 * AT_J, 1e3 * AT_K]}, r"a node lies 45 m from the reference point of the joint"),
         ({"units": "inch"}, "units must be"),
         ({"faces": [[1, 2, 3]]}, "faces must be two lists of nodes"),
-        ({"faces": [[1, 2], [2, 3]]}, "faces must hold each node once, and not the nodes of the joint, as 2"),
+        ({"faces": [[1, 2], [2, 3]]}, "faces must contain each node once, and not the nodes of the joint, as 2"),
         ({"faces": [[1, 2], [102, 3]]}, "and not the nodes of the joint, as 102"),
         ({"positions": AT_J, "points": AT_J}, "positions must have shape"),
         ({"positions": [AT_J, AT_K], "points": [np.nan, 0, 0]}, "points"),

@@ -61,7 +61,7 @@ def test_blocks_of_output2(nastran):
     assert found.matrix.shape == (66, 66)
     assert abs(found.matrix - found.matrix.T).max() <= 1e-9 * abs(found.matrix).max()
     with pytest.raises(
-        FileContentError, match=r"holds no matrix mass, but (BHH, KHH|KHH, BHH): name one after the file"
+        FileContentError, match=r"contains no matrix mass, but (BHH, KHH|KHH, BHH); name one after the file"
     ):
         read_matrix(path, "mass")
 

@@ -120,7 +120,7 @@ def test_names_after_the_file_and_several_matrices(tmp_path):
         text = f"DMIG    {name:<8}{0:8d}{6:8d}{2:8d}{0:8d}\nDMIG*   {name:<16}{1:16d}{1:16d}\n*       {1:16d}{1:16d}"
         with (tmp_path / "two.pch").open("a") as file:
             file.write(f"{text}{float(name[1]):16.8E}\n")
-    with pytest.raises(FileContentError, match=r"several that may be the stiffness, but K1, K2: name one"):
+    with pytest.raises(FileContentError, match=r"several that may be the stiffness, but K1, K2; name one"):
         read_matrix(tmp_path / "two.pch", "stiffness")
     assert read_matrix(tmp_path / "two.pch#K2", "stiffness").matrix.toarray().tolist() == [[2.0]]
 
@@ -236,7 +236,7 @@ def test_a_node_that_follows_a_rigid_point_is_found_by_its_place(tmp_path, model
     [
         ('set = "NONE"', r"has no set 'NONE'; it has ALL, ENDS, LINE, FIRST"),
         ("nodes = [1, 9999]", "point tip: the place of node 9999 is not known"),
-        ("nodes = [1]", "needs at least three nodes that are not on one line"),
+        ("nodes = [1]", "cannot rotate with its nodes; give three that are not on one line"),
         ("box = [5.0, 5.0, 5.0, 6.0, 6.0, 6.0]", "no node lies in it"),
         ('nodes = [1]\nset = "ENDS"', "exactly one of them names the patch"),
         ("", "exactly one of them names the patch"),
@@ -348,7 +348,7 @@ def test_axes_of_nodes_of_their_own_are_not_taken_for_those_of_the_model(tmp_pat
         ("*NODE\n1, 0, 0, 0\n1, 5, 0, 0\n", r"node 1 is defined twice, at \(0, 0, 0\) and \(5, 0, 0\)"),
         ("*NODE\n1, 0, 0, 0\n*TRANSFORM, NSET=A\n0,1,0, -1,0,0\n", "turns the set A, which is not there"),
         ("GRID,1,7,0.,0.,0.\n", r"in a local system \(CP\)"),
-        ("1 0 0\n", "must hold node, x, y, z"),
+        ("1 0 0\n", "must contain node, x, y, z"),
     ],
 )
 def test_nodes_that_are_not_read(tmp_path, text, message):
@@ -400,17 +400,17 @@ def test_files_of_nodes_cut_and_changed_anywhere(tmp_path, model, name):
     ("name", "text", "message"),
     [
         ("k.sti", "999999999999 1 1.0\n", "states content of"),
-        ("k.sti", "1 1\n", "a line must hold 3 numbers, not 2"),
+        ("k.sti", "1 1\n", "a line must contain 3 numbers, not 2"),
         ("k.sti", "1.5 1 2.0\n", "numbers of rows and columns must be whole numbers"),
         ("k.sti", "0 1 2.0\n", "names row or column 0 of 1"),
-        ("k.sti", "1 1 nan\n", "holds NaN or Inf in row 1, column 1"),
+        ("k.sti", "1 1 nan\n", "contains NaN or Inf in row 1, column 1"),
         ("k.mtx", "1,1, 1,1001, 2.0\n", "numbers of DOFs must be 0 to 999"),
         ("k.pch", "DMIG,KAAX,1,1,,1,1,2.0\n", "'KAAX' has no card that begins it"),
-        ("k.pch", "DMIG,KAAX,0,2,2,0,,,1\nDMIG,KAAX,1,1,,1,1,2.0\n", "is of form 2, a square matrix is wanted"),
-        ("k.pch", "DMIG,KAAX,0,6,4,0,,,1\nDMIG,KAAX,1,1,,1,1,2.0,3.0\n", "must hold real numbers, not complex"),
+        ("k.pch", "DMIG,KAAX,0,2,2,0,,,1\nDMIG,KAAX,1,1,,1,1,2.0\n", "is of form 2; write a square matrix"),
+        ("k.pch", "DMIG,KAAX,0,6,4,0,,,1\nDMIG,KAAX,1,1,,1,1,2.0,3.0\n", "must contain real numbers, not complex"),
         ("k.pch", "DMIG,KAAX,0,6,2,0,,,1\nDMIG,KAAX,1,1,,1,1,abc\n", "'ABC' is no number|'abc' is no number"),
-        ("k.rsa", "t\n 3 1 1 1 0\nRSA 999999999 999999999 999999999 0\n(1I8) (1I8) (1D25.15)\n", "not hold the 999"),
-        ("k.rsa", "t\n 3 1 1 1 0\nPSA 1 1 1 0\n(1I8) (1I8) (1D25.15)\n", "must hold an assembled real matrix"),
+        ("k.rsa", "t\n 3 1 1 1 0\nRSA 999999999 999999999 999999999 0\n(1I8) (1I8) (1D25.15)\n", "not contain the 999"),
+        ("k.rsa", "t\n 3 1 1 1 0\nPSA 1 1 1 0\n(1I8) (1I8) (1D25.15)\n", "must contain an assembled real matrix"),
         ("k.xyz", "1 1 1\n", "is of an unknown format of matrices; known are NPZ"),
     ],
 )  # fmt: skip

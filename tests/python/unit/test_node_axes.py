@@ -67,7 +67,7 @@ def test_frfs_without_all_three_directions_are_left_out(tmp_path):
     head = (units(1, 1) + system(5, OBLIQUE) + nodes(5)).encode()
     functions = [function(response=(node, 3), reference=(node, 3)) for node in (1, 2)]
     (tmp_path / "a.uff").write_bytes(head + b"".join(functions))
-    with pytest.warns(FileContentWarning, match="directions at node 1 are local, so their channels are left out"):
+    with pytest.warns(FileContentWarning, match="directions at node 1 are local and left out"):
         frfs = read_uff(tmp_path / "a.uff")
     assert [str(one) for one in frfs.responses] == ["2:+z"]
     (tmp_path / "b.uff").write_bytes(head + functions[0])

@@ -52,13 +52,13 @@ TEXTS = {
     "thin bricks": ("part.toml", BRICKS.replace("height = 0.01", "height = 1e-9"), part, "length = 1.0 needs"),
     "rows of CalculiX": ("k.sti", "999999999999 1 1.0\n", matrix, "states content of"),
     "rows of Abaqus": ("k.mtx", "99999999999 1 1.0\n", matrix, "states content of"),
-    "Harwell-Boeing": ("k.rsa", HB.format(99999999999), matrix, "it does not hold the 99999999999 entries"),
+    "Harwell-Boeing": ("k.rsa", HB.format(99999999999), matrix, "it does not contain the 99999999999 entries"),
     "Matrix Market": (
         "k.mtx", "%%MatrixMarket matrix coordinate real general\n99999999999 99999999999 1\n1 1 1.0\n", matrix,
         "states content of",
     ),
     "Matrix Market array": (
-        "k.mtx", "%%MatrixMarket matrix array real general\n99999 99999\n1.0\n", matrix, "does not hold the"
+        "k.mtx", "%%MatrixMarket matrix array real general\n99999 99999\n1.0\n", matrix, "does not contain the"
     ),
 }  # fmt: skip
 

@@ -26,7 +26,7 @@ def _triplets(path: Path, limit: ReadLimit, columns: int, delimiter: str | None 
     limit.take(8 * columns * (path.stat().st_size // _LEAST_LINE + 1) // 2)
     found = np.loadtxt(path, comments="*", delimiter=delimiter, ndmin=2, encoding="latin-1")
     if found.shape[0] == 0 or found.shape[1] != columns:
-        raise ValueError(f"a line must hold {columns} numbers, not {found.shape[1] if found.size else 0}")
+        raise ValueError(f"a line must contain {columns} numbers, not {found.shape[1] if found.size else 0}")
     places = found[:, :-1]
     if not np.isfinite(places).all() or (places != np.rint(places)).any() or abs(places).max() > 2**53:
         raise ValueError("numbers of rows and columns must be whole numbers")

@@ -208,5 +208,5 @@ def chosen_name(path: Path, wanted: str, held: Sequence[str]) -> str:
         return found[0]
     what = f"no matrix {wanted}" if not found else f"several that may be the {wanted}"
     raise FileContentError(
-        f"{path} holds {what}, but {', '.join(held[:12]) or 'nothing'}: name one after the file, {path.name}#NAME"
+        f"{path} contains {what}, but {', '.join(held[:12]) or 'nothing'}; name one after the file, {path.name}#NAME"
     )

@@ -51,13 +51,13 @@ def _read_dmig(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
             raise FileContentError(f"{path} cannot be read as DMIG cards: {title!r} has no card that begins it")
         _add_column(found[title], fields, path)
     if not found:
-        raise FileContentError(f"{path} holds no DMIG cards")
+        raise FileContentError(f"{path} contains no DMIG cards")
     title = chosen_name(path, name, list(found))
     own = found[title]
     if own.form not in (_SQUARE, _SYMMETRIC):
-        raise FileContentError(f"{path}: {title} is of form {own.form}, a square matrix is wanted (1 or 6)")
+        raise FileContentError(f"{path}: {title} is of form {own.form}; write a square matrix, form 1 or 6")
     if own.kind > 2:
-        raise FileContentError(f"{path}: {title} must hold real numbers, not complex ones")
+        raise FileContentError(f"{path}: {title} must contain real numbers, not complex ones")
     if not own.values:
         raise FileContentError(f"{path}: {title} has no entries")
     labels = np.array(own.labels, np.int64).reshape(-1, 4)
@@ -137,7 +137,7 @@ def _read_op2(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
         limit.take(_FULL * rows * columns)
         found = file.rdop2mats([chosen])[chosen]
     if found.dtype.kind == "c":
-        raise FileContentError(f"{path}: {chosen} must hold real numbers, not complex ones")
+        raise FileContentError(f"{path}: {chosen} must contain real numbers, not complex ones")
     return StoredMatrix(sparse.csr_array(found), None, "Nastran")
 
 

@@ -266,7 +266,7 @@ def _of_table(path: Path, limit: ReadLimit) -> NodeFile:
         if not words or (not found.coordinates and not words[0].isdecimal()):
             continue  # a heading
         if len(words) != 4:
-            raise FileContentError(f"{path}: line {number} must hold node, x, y, z, not {line.strip()[:40]!r}")
+            raise FileContentError(f"{path}: line {number} must contain node, x, y, z, not {line.strip()[:40]!r}")
         found.add(path, words[0], words[1:])
     return found
 
@@ -343,7 +343,7 @@ def read_dof_names(path: Path) -> tuple[str, ...]:
             words[1] = _direction(path, number, words[1])
         names.append(":".join(words))
     if not names:
-        raise FileContentError(f"{path} holds no names of DOFs")
+        raise FileContentError(f"{path} contains no names of DOFs")
     return tuple(names)
 
 
@@ -363,8 +363,8 @@ def _of_extrn(path: Path) -> tuple[str, ...]:
         words = [word for word in fields if word]
         for node, dofs in zip(words[::2], words[1::2], strict=False):
             if not (node.isdecimal() and dofs.isdecimal()):
-                raise FileContentError(f"{path}: an EXTRN card must hold points and DOFs, not {node} {dofs}"[:200])
+                raise FileContentError(f"{path}: an EXTRN card must contain points and DOFs, not {node} {dofs}"[:200])
             names += [dof_name(node, int(digit)) for digit in dofs]
     if not names:
-        raise FileContentError(f"{path} holds no EXTRN card, which names the DOFs of its matrices")
+        raise FileContentError(f"{path} contains no EXTRN card, which names the DOFs of its matrices")
     return tuple(names)
