@@ -246,7 +246,10 @@ def test_a_chunk_that_unfolds_to_more_than_it_states(tmp_path, h5py):
     ("text", "message"),
     [
         ("coordinate real general\n100000000000 100000000000 1\n1 1 1.0\n", "states content of"),
-        ("coordinate real general\n9 9 10000000000\n1 1 1.0\n", "does not contain the 10000000000 entries that it states"),
+        (
+            "coordinate real general\n9 9 10000000000\n1 1 1.0\n",
+            "does not contain the 10000000000 entries that it states",
+        ),
         ("array real general\n100000 100000\n1.0\n", "does not contain the 10000000000 entries that it states"),
     ],
 )
