@@ -20,7 +20,8 @@ from jointfrf.frf.merge import same_lines
 from jointfrf.io.arrays import contradiction
 from jointfrf.io.file_format import FileFormat, Reading
 from jointfrf.io.labels import DIRECTION_CODES
-from jointfrf.io.uff_file import UniversalFile, name_some, node_coordinates
+from jointfrf.io.uff_axes import NodeAxes, global_channels, node_axes, node_coordinates
+from jointfrf.io.uff_file import UniversalFile, name_some
 from jointfrf.io.uff_function import (
     DELIMITER,
     FunctionHeader,
@@ -131,12 +132,15 @@ def read_uff(
         Something was assumed or left out; each is reported once, with its datasets. Left out are a dataset
         that the end of the file cuts short, FRFs without node or direction, of unknown kind or not of motion per force
         (if no others remain, that is an error), further FRFs between the same channels, a line at 0 Hz that is not a
-        number, local coordinates. Assumed are units.
+        number, local coordinates, FRFs in local directions that cannot be turned. Assumed are units.
 
     Notes
     -----
     Units come from the labels of dataset 58 where they are understood. Otherwise the values are divided by the length
     and force factors of dataset 164, as its definition [1]_ says; coordinates always are.
+
+    Directions of nodes with a displacement system of their own (datasets 15, 2411, 18, 2420) become global ones. Axes
+    along global ones rename the channels. Others need all three directions of a node, as responses or as forces.
 
     References
     ----------
@@ -176,12 +180,36 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfSet:
         limit.take(matrix.bytes(freq_hz.size))
         h = np.full((freq_hz.size, *matrix.shape), np.nan + 0j)
     freq_hz, h, coherence = _without_bad_zero_line(file, frfs, matrix, freq_hz, h, coherence)
-    coordinates = node_coordinates(file, {channel.node for pair in pairs for channel in pair})
+    at = {channel.node for pair in pairs for channel in pair}
+    coordinates, axes = node_coordinates(file, at), node_axes(file, at)
+    responses, excitations = matrix.responses, matrix.excitations
+    if axes:
+        limit.take(matrix.bytes(freq_hz.size))
+        responses, excitations, h, coherence = _in_global_axes(file, axes, matrix, h, coherence)
     reading.notes.extend(file.notes())
     stated = _some(frf.stated for frf in frfs)
-    return FrfSet(
-        freq_hz, matrix.responses, matrix.excitations, h, common, coordinates, str(path), coherence, None, stated
-    )
+    return FrfSet(freq_hz, responses, excitations, h, common, coordinates, str(path), coherence, None, stated)
+
+
+def _in_global_axes(
+    file: UniversalFile,
+    axes: NodeAxes,
+    matrix: _Matrix,
+    h: NDArray[np.complex128],
+    coherence: NDArray[np.float64] | None,
+) -> tuple[tuple[Channel, ...], tuple[Channel, ...], NDArray[np.complex128], NDArray[np.float64] | None]:
+    """Return channels, FRFs and coherences in global directions; a sum of channels has no coherence."""
+    rows, responses, h = global_channels(file, axes, matrix.responses, h)
+    columns, excitations, h = global_channels(file, axes, matrix.excitations, h.swapaxes(1, 2))
+    if not (responses and excitations):
+        raise file.error(
+            "holds FRFs in local directions only; set the displacement system of the nodes to 0 and state directions "
+            "in a channel table"
+        )
+    if coherence is not None:
+        unknown = (np.array(rows) < 0)[:, None] | (np.array(columns) < 0)
+        coherence = np.where(unknown, np.nan, coherence[:, rows][:, :, columns])
+    return responses, excitations, h.swapaxes(1, 2), coherence
 
 
 class _Matrix:

@@ -230,6 +230,8 @@ def _followers(model: PointModel, number: Mapping[str, int], patch: PointPatch) 
         held = [name for name in names[:3] if name not in number]
         if held:
             why = "it is held or belongs to another constraint of the file"
+            if any(f"{node}:local_{direction}" in number for direction in DIRECTIONS[:3]):
+                why = "its directions are local; write the model in global ones"
             raise ValueError(f"point {patch.name}: node {node} has no DOF {held[0]}: {why}")
         dofs += [number[name] for name in names[:3]]
         rows += list(motion[i])
@@ -243,7 +245,7 @@ def _followers(model: PointModel, number: Mapping[str, int], patch: PointPatch) 
     seen = np.linalg.svd(whole * np.r_[np.ones(3), np.full(3, 1 / size)], compute_uv=False)
     if len(whole) < 6 or seen[-1] <= _HELD * seen[0]:
         raise ValueError(
-            f"point {patch.name} needs at least three nodes that are not on one line, or nodes with rotations, to hold "
+            f"point {patch.name} cannot rotate with its nodes; give three that are not on one line, or nodes with "
             "rotations"
         )
     return _Followers(dofs, whole, at)
