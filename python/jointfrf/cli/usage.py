@@ -51,8 +51,8 @@ _WORDS = tuple(
     for python, option in (
         (r"\bsay (\w+)= by mapping", r"say --map \1=..."),
         (r"\bor (\w+)= by mapping", r"or --map \1=..."),
-        (r"\b(by|of) mapping\b", r"\1 --map"),
-        (r"\bmapping names\b", "--map names"),
+        (r"\bmapping (\w+=)", r"--map \1"),
+        (r"\b(by|of|in) mapping\b", r"\1 --map"),
         (r"\bgive axes=", "give --map axes="),
         (r"\bgive quantity=", "give --quantity"),
         (r"\bleave the quantity out, or force it", "leave --quantity out, or say --force-quantity"),
