@@ -129,7 +129,7 @@ def _csv_rows(file: Path) -> Iterator[ChannelKeys]:
 
 def _column(file: Path, word: str) -> tuple[str, float]:
     """Return the name of a column, and what one of its unit is in m."""
-    match = re.fullmatch(r"\s*(\w+)\s*(?:\[\s*(\w+)\s*\])?\s*", word)
+    match = re.fullmatch(r"(\w+)\s*(?:\[\s*(\w+)\s*\])?", word.strip())
     name = match[1].lower() if match else word.strip()
     if name not in _COLUMNS or match is None:
         hint = did_you_mean(name, _COLUMNS)

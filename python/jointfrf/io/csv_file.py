@@ -31,9 +31,9 @@ _PARTS = {
     "coherence": "coherence", "coh": "coherence",
 }  # fmt: skip
 #: A channel as in ``102:+y`` or ``bar:102 -Z``, and response / excitation; a unit in brackets; the first column.
-_CHANNEL = r"[^\s/,;()\[\]]*?\d+[\s:._]*[+-]?r?[xyz][+-]?"
+_CHANNEL = r"(?<![^\s/,;()\[\]])[^\s/,;()\[\]]*?(?<!\d)\d++[\s:._]*+[+-]?r?[xyz][+-]?"
 _PAIR = re.compile(rf"({_CHANNEL})\s*/\s*({_CHANNEL})(?![a-z])", re.IGNORECASE)
-_UNIT = re.compile(r"\[([^\]]*)\]")
+_UNIT = re.compile(r"\[([^\[\]]*)\]")
 _FREQUENCY = re.compile(r"(f|freq|frequency|freq_hz|hz)\b", re.IGNORECASE)
 #: Factors to Hz and to radians by the unit in brackets; Hz and degrees where there is none.
 _HZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi}
