@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from jointfrf.spelling import visible
+from jointfrf.spelling import cut, message, visible
 
 __all__ = [
     "OptionWarning",
@@ -66,9 +66,9 @@ _WORDS = tuple(
 )
 
 
-def complain(kind: str, message: object) -> None:
+def complain(kind: str, about: object) -> None:
     """Print a warning or an error as one line that does nothing to a terminal: the name of a file may hold anything."""
-    print(f"jointfrf: {kind}: {visible(in_options(str(message)))}", file=sys.stderr)
+    print(f"jointfrf: {kind}: {message(in_options(cut(str(about))))}", file=sys.stderr)
 
 
 def in_options(text: str) -> str:
@@ -108,7 +108,7 @@ class Output:
     def give(self, content: Mapping[str, Any]) -> None:
         """Print the result as JSON where that is wanted, with all warnings at its top level."""
         if self._is_json:
-            warned = [in_options(str(text)) for text in (*content.get("warnings", ()), *self._warned)]
+            warned = [in_options(cut(str(text))) for text in (*content.get("warnings", ()), *self._warned)]
             whole = {**content, "warnings": list(dict.fromkeys(warned))}
             print(json.dumps(plain(whole), indent=2, allow_nan=False))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
+from bisect import bisect_left
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -29,6 +30,8 @@ _INDENT = 5
 _AFTER_NUMBERS = re.compile(rb"\s{0,4}?( {4}-1)[ \t]{0,122}(?=[\r\n]|\Z)")
 #: Bytes that decide whether a place is a delimiter: blanks before and behind, line ends.
 _REACH = 140
+#: Bytes of a dataset from its delimiter on, among which its type stands.
+_TYPE = 300
 #: Bytes of the file in memory: fewer take longer, more do not take less time.
 _CHUNK = 1 << 22
 #: Bytes of a value by the data type of record 7, and of the abscissa before it where the spacing is uneven.
@@ -110,7 +113,7 @@ class _Window:
             start = match.start()
             indent = self.content[max(start - _INDENT, 0) : start]
             begin = start - len(indent) + len(indent.rstrip(b" \t"))
-            is_first = self.start == 0 and self.content[:begin] in (b"", codecs.BOM_UTF8)
+            is_first = self.start == 0 and begin in (0, 3) and self.content[:begin] in (b"", codecs.BOM_UTF8)
             if is_first or (begin and self.content[begin - 1 : begin] in (b"\r", b"\n")):
                 return begin, match.end()
         return None
@@ -155,7 +158,7 @@ def _length_of_values(record: bytes) -> int:
 
 def _kind(head: bytes) -> int:
     try:
-        return int(head.splitlines()[1][:6])
+        return int(head[:_TYPE].splitlines()[1][:6])
     except (ValueError, IndexError):
         return 0
 
@@ -197,6 +200,9 @@ class UniversalFile:
                 "ends inside its first dataset" if is_cut else "is not a Universal File: no dataset delimiters (-1)"
             )
         self.types = [dataset.kind for dataset in self._index]
+        self._numbers: dict[int, list[int]] = {}
+        for number, kind in enumerate(self.types, start=1):
+            self._numbers.setdefault(kind, []).append(number)
         for number, kind in enumerate(self.types, start=1):
             if kind <= 0:
                 raise self.error(f"is damaged: dataset {number} has no type, a delimiter (-1) is missing before it")
@@ -227,7 +233,9 @@ class UniversalFile:
 
     def datasets(self, *kinds: int) -> list[int]:
         """Numbers of the datasets of some types."""
-        return [number for number, kind in enumerate(self.types, start=1) if kind in kinds]
+        if len(kinds) == 1:
+            return self._numbers.get(kinds[0], [])
+        return sorted(number for kind in kinds for number in self._numbers.get(kind, ()))
 
     def function_name(self, kind: int, count: int = 1) -> str:
         """Return what a type of function of dataset 58 is called."""
@@ -258,8 +266,8 @@ class UniversalFile:
         """Units of a dataset: the last dataset 164 before it, else the first of the file, else None."""
         if self._systems is None:
             self._systems = {number: self._read_unit_system(number) for number in self.datasets(164)}
-        before = [system for number, system in self._systems.items() if number < dataset]
-        return before[-1] if before else next(iter(self._systems.values()), None)
+        numbers = self.datasets(164)
+        return self._systems[numbers[max(bisect_left(numbers, dataset) - 1, 0)]] if numbers else None
 
     def _read_unit_system(self, dataset: int) -> UnitSystem:
         with self.damage_named(dataset):
@@ -314,14 +322,14 @@ def node_coordinates(file: UniversalFile, nodes: Collection[int]) -> dict[int, N
     that no dataset (18, 2420) defines is taken as global.
     """
     coordinates: dict[int, NDArray[np.float64]] = {}
-    axes = _coordinate_systems(file)
+    axes, wanted = _coordinate_systems(file), set(nodes)
     for number in file.datasets(15, 2411):
         try:
             rows = _node_rows(file.records(number))
         except ValueError:
             file.note("the coordinates of nodes cannot be read and are left out", number)
             continue
-        rows = rows[np.isin(rows[:, 0], list(nodes))]
+        rows = rows[[node in wanted for node in rows[:, 0].tolist()]]
         turned = [int(row[0]) for row in rows if axes.get(int(row[2]), _Axes()).turned]
         if turned:
             file.note(
