@@ -80,7 +80,11 @@ def test_commas_tabs_and_inches(tmp_path):
         ("at = [10, 20, 30]", "at = [10, 20]", "at must be three numbers"),
         ("direction = [0.0, 0.6, -0.8]", "direction = [0.0, 0.6, -0.9]", "direction must have length 1, not 1.08"),
         ("axes = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]", "axes = [[0, 1, 0]]", "axes must be three lists"),
-        ("axes = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]", "direction = [0, 0, 1]", "direction belongs to a channel; give axes of the node"),
+        (
+            "axes = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]",
+            "direction = [0, 0, 1]",
+            "direction belongs to a channel; give axes of the node",
+        ),
         ('unit = "mm"', 'unit = "km"', "unit must be one of m, mm, cm, in"),
         ('unit = "mm"', 'units = "mm"', "unknown key 'units'"),
         ("[[channel]]", "[[channels]]", "unknown key 'channels'.*did you mean 'channel'"),
