@@ -101,7 +101,7 @@ def read_channel_table(path: str | PathLike[str]) -> tuple[ChannelPlace, ...]:
         return _places_of(read_keys(read_toml(file), ChannelTableKeys))
     found = tuple(place for row in _csv_rows(file) for place in _places(row))
     if not found:
-        raise FileContentError(f"{file} holds no channels")
+        raise FileContentError(f"{file} has no channels; add a row for each")
     return found
 
 
@@ -121,7 +121,7 @@ def _csv_rows(file: Path) -> Iterator[ChannelKeys]:
     columns = [_column(file, word) for word in table.heading]
     names = [name for name, _ in columns]
     if len(set(names)) < len(names):
-        raise FileContentError(f"{file}: a column is named twice: {', '.join(names)}")
+        raise FileContentError(f"{file}: a column is named twice ({', '.join(names)}); leave one out")
     for where, cells in table.rows:
         given = {name: cell for name, cell in zip(names, cells, strict=True) if cell}
         yield read_keys(TomlTable(_csv_values(table, where, given, dict(columns)), where), ChannelKeys)
@@ -129,11 +129,11 @@ def _csv_rows(file: Path) -> Iterator[ChannelKeys]:
 
 def _column(file: Path, word: str) -> tuple[str, float]:
     """Return the name of a column, and what one of its unit is in m."""
-    match = re.fullmatch(r"\s*(\w+)\s*(?:\[\s*(\w+)\s*\])?\s*", word)
+    match = re.fullmatch(r"(\w+)\s*(?:\[\s*(\w+)\s*\])?", word.strip())
     name = match[1].lower() if match else word.strip()
     if name not in _COLUMNS or match is None:
         hint = did_you_mean(name, _COLUMNS)
-        raise FileContentError(f"{file}: unknown column {name!r}; it takes {', '.join(_COLUMNS)}{hint}")
+        raise FileContentError(f"{file}: unknown column {name!r}; use one of {', '.join(_COLUMNS)}{hint}")
     unit = match[2] or ""
     if unit and (name not in "xyz" or unit not in _UNITS):
         raise FileContentError(f"{file}: column {word.strip()!r}: only x, y, z have a unit, out of {', '.join(_UNITS)}")
@@ -157,7 +157,7 @@ def _csv_values(table: TextTable, where: str, given: Mapping[str, str], scales: 
         there = [name for name in names if name in given]
         if there and len(there) < 3:
             missing = next(name for name in names if name not in given)
-            raise FileContentError(f"{where}: {there[0]} is given, {missing} is not")
+            raise FileContentError(f"{where}: {there[0]} is given without {missing}; add {missing}")
         if there:
             values[vector] = [number(name) * scales[name] for name in names]
     if "node" in given:
@@ -171,11 +171,11 @@ def _places(row: ChannelKeys, unit: float = 1.0) -> list[ChannelPlace]:
     """Return the channels that a table names, whose positions are in this unit, m."""
     where, at = row.table.where, None if row.at is None else unit * np.array(row.at)
     if (row.channel is None) == (row.node is None):
-        raise FileContentError(f"{where}: either channel or node must be named")
+        raise FileContentError(f"{where}: name either channel or node")
     if row.direction is not None and row.node is not None:
-        raise FileContentError(f"{where}: direction goes with channel; the directions of a node are axes")
+        raise FileContentError(f"{where}: direction belongs to a channel; give axes of the node")
     if row.axes is not None and row.channel is not None:
-        raise FileContentError(f"{where}: axes go with node; the direction of a channel is direction")
+        raise FileContentError(f"{where}: axes belong to a node; give direction of the channel")
     if row.channel is not None:
         channel = row.build(partial(Channel.parse, row.channel))
         direction = None if row.direction is None else _unit(row, "direction", row.direction)

@@ -18,7 +18,7 @@ from jointfrf.files import ReadLimit, text_of, write_file
 from jointfrf.frf.frf_set import Channel, FrfSet
 from jointfrf.io.file_format import FileFormat, FrfArrays, Reading
 from jointfrf.io.functions import LooseFunction, arrays_of_functions
-from jointfrf.io.labels import channels_of
+from jointfrf.io.labels import ChannelNamer
 from jointfrf.io.named_arrays import fields_of
 
 __all__ = ["CSV", "TextTable", "read_text_table", "write_csv"]
@@ -31,9 +31,9 @@ _PARTS = {
     "coherence": "coherence", "coh": "coherence",
 }  # fmt: skip
 #: A channel as in ``102:+y`` or ``bar:102 -Z``, and response / excitation; a unit in brackets; the first column.
-_CHANNEL = r"[^\s/,;()\[\]]*?\d+[\s:._]*[+-]?r?[xyz][+-]?"
+_CHANNEL = r"(?<![^\s/,;()\[\]])[^\s/,;()\[\]]*?(?<!\d)\d++[\s:._]*+[+-]?r?[xyz][+-]?"
 _PAIR = re.compile(rf"({_CHANNEL})\s*/\s*({_CHANNEL})(?![a-z])", re.IGNORECASE)
-_UNIT = re.compile(r"\[([^\]]*)\]")
+_UNIT = re.compile(r"\[([^\[\]]*)\]")
 _FREQUENCY = re.compile(r"(f|freq|frequency|freq_hz|hz)\b", re.IGNORECASE)
 #: Factors to Hz and to radians by the unit in brackets; Hz and degrees where there is none.
 _HZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi}
@@ -116,7 +116,7 @@ def _cells(where: str, line: str, mark: str) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
-def _read(path: Path, limit: ReadLimit, _: Reading) -> FrfArrays:
+def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
     """Read columns whose names say response, excitation, part and unit, after one of frequencies."""
     table = read_text_table(path)
     where, first = str(path), table.heading[0]
@@ -129,8 +129,9 @@ def _read(path: Path, limit: ReadLimit, _: Reading) -> FrfArrays:
     numbers = np.array([_numbers(table, place, cells) for place, cells in table.rows])
     if not numbers.size or len(table.heading) < 2:
         raise FileContentError(f"{path} holds no table of numbers below a heading")
+    namer = reading.mapping.namer
     for name, column in zip(table.heading[1:], numbers.T[1:], strict=True):
-        pair, part = _column(name, where)
+        pair, part = _column(name, where, namer)
         if part in parts.setdefault(pair, {}):
             raise FileContentError(f"{where} has two columns {name!r}")
         parts[pair][part] = _unit_of(name), column
@@ -159,7 +160,7 @@ def _numbers(table: TextTable, place: str, cells: list[str]) -> list[float]:
         raise
 
 
-def _column(name: str, where: str) -> tuple[tuple[Channel, Channel], str]:
+def _column(name: str, where: str, namer: ChannelNamer) -> tuple[tuple[Channel, Channel], str]:
     """Response, excitation and part that a heading names."""
     match = _PAIR.search(name)
     if match is not None:
@@ -167,7 +168,7 @@ def _column(name: str, where: str) -> tuple[tuple[Channel, Channel], str]:
         named = {_PARTS[word] for word in re.findall(r"[a-z]+", rest.lower()) if word in _PARTS}
         if len(named) == 1:
             try:
-                pair = channels_of("heading", [match[1]])[0], channels_of("heading", [match[2]])[0]
+                pair = namer.channel("heading", match[1]), namer.channel("heading", match[2])
             except ValueError as error:
                 raise FileContentError(f"{where} {error}") from error
             return pair, named.pop()

@@ -45,12 +45,12 @@ FORMATS = tuple(map(_format_of, _MODULES))
 #: Entry points by which other packages add formats; they are looked at where a file is of none of the above.
 _PLUGINS = "jointfrf.formats"
 #: Why a pickle is an error.
-_PICKLE = "is a pickle, which is not read because that can run any program: save an NPZ file"
+_PICKLE = "is a pickle, which could run any program; save an NPZ file"
 #: First bytes of files that are not read, and what the user can do.
 _OTHERS = (
-    (b"\x93NUMPY", "is an NPY file, one array without frequencies: save an NPZ file, or use frfs_of_arrays"),
+    (b"\x93NUMPY", "is an NPY file, one array without frequencies; save an NPZ file, or use frfs_of_arrays"),
     *((b"\x80" + bytes([protocol]), _PICKLE) for protocol in (2, 3, 4, 5)),
-    (b"\x1f\x8b", "is compressed by gzip: unpack it"),
+    (b"\x1f\x8b", "is compressed by gzip; unpack it"),
     (b"TDSm", "is a TDMS file: export a Universal File"),
 )
 
@@ -76,7 +76,7 @@ def check_suffix(path: str | PathLike[str]) -> FileFormat:
         return written[suffix]
     found, broken = _of_plugin(lambda each: each.write is not None and suffix in each.suffixes)
     if found is None:
-        raise ValueError(f"{path} has no suffix of a format that is written: {', '.join(written)}{broken}")
+        raise ValueError(f"{path} has no suffix of a format that is written; use one of {', '.join(written)}{broken}")
     return found
 
 
@@ -150,11 +150,9 @@ def read_frfs(
     nodes : collection of int, optional
         Only FRFs between these nodes.
     mapping : mapping, optional
-        Which field of a MATLAB, NPZ or HDF5 file is what, where it has other names than the usual ones: keys
-        ``freq_hz``, ``h``, ``responses``, ``excitations``, ``quantity``, ``unit``, ``coherence``, ``averages`` (names
-        of fields, ``test.frf`` inside a structure; channels also as their names), ``axes`` (``out,in,freq``). Instead
-        of names of channels ``response_nodes`` and ``response_directions`` (``x``, ``-rz``; or codes 1 to 6), and
-        ``excitation_nodes`` and ``excitation_directions``.
+        Which field of a MATLAB, NPZ or HDF5 file is what, if it has other names than the usual ones, and what a file of
+        any format lacks, as in `FrfMapping`: ``{"h": "test.frf", "axes": "out,in,freq"}``, ``{"direction": "z"}``,
+        ``{"components": "frame:0,arm:1000"}``, ``{"responses": "101:z,201:z", "excitations": "101:z"}``.
     averages : number or array_like, shape (n_responses, n_excitations), optional
         Number of averages, where the files do not say it.
     limit_gb : float, optional
@@ -220,6 +218,6 @@ def _detected(path: Path, head: bytes) -> FileFormat:
     if found is None:
         found, broken = _of_plugin(lambda each: each.has_mark(head) or each.looks_alike(path, head))
     if found is None:
-        refusal = refusal or f"is of an unknown format; known are {format_names()}"
+        refusal = refusal or f"is of an unknown format; use one of {format_names()}"
         raise FileContentError(f"{path} {refusal}{broken}")
     return found

@@ -59,7 +59,7 @@ _SYMBOLS = {name: Unit(to_si, exponents) for exponents, units in _UNITS.items() 
 # U+FFFD is what is left of a superscript 2 in Latin-1.
 _SPELLINGS = {"²": "^2", "\ufffd": "^2", "**": "^", "·": "*", ".": "*", "µ": "u", "μ": "u", "°": "deg"}
 #: A name, a number or a sign of a unit.
-_TOKEN = re.compile(r"\s*([A-Za-z]+|\d+|[-^*/()])")
+_TOKEN = re.compile(r"[A-Za-z]+|\d+|[-^*/()]")
 
 
 def parse_unit(label: str) -> Unit | None:

@@ -106,7 +106,7 @@ def array_file():
 
 
 KNOWN = (
-    "is of an unknown format; known are Universal File (.uff .unv), MATLAB (.mat), NPZ (.npz), HDF5 (.h5 .hdf5) and "
+    "is of an unknown format; use one of Universal File (.uff .unv), MATLAB (.mat), NPZ (.npz), HDF5 (.h5 .hdf5) and "
     "CSV (.csv .txt)"
 )
 
@@ -117,9 +117,9 @@ KNOWN = (
         (b"%PDF-1.7\n\0\1\2", KNOWN),
         (b"some words\nand more\n", KNOWN),
         (bytes(range(1, 256)) + b"\0", KNOWN),
-        (pickled(), "is a pickle, which is not read because that can run any program"),
+        (pickled(), "is a pickle, which could run any program; save an NPZ file"),
         (array_file(), "is an NPY file, one array without frequencies"),
-        (b"\x1f\x8b\x08", "is compressed by gzip: unpack it"),
+        (b"\x1f\x8b\x08", "is compressed by gzip; unpack it"),
         (b"TDSm\0\0", "is a TDMS file: export a Universal File"),
         (b"PK\x03\x04 and nothing", "cannot be read as an NPZ file"),
         (b"\x89HDF\r\n\x1a\n and nothing", "cannot be read as an HDF5 file"),
@@ -170,7 +170,7 @@ def test_stated_sizes_that_exceed_the_file(tmp_path):
     path = tmp_path / "huge.npz"
     for shape in ((10**12, 1, 1), (10**6, 10**6, 10**9)):
         npz_with_header(path, shape)
-        assert "is damaged: h.npy does not hold the" in refused(path)
+        assert "is damaged: h.npy has not the" in refused(path)
     path = tmp_path / "huge.h5"
     write_hdf5(path, GIVEN)
     with h5py.File(path, "r+") as file:
@@ -230,7 +230,7 @@ def test_damaged_texts_of_an_hdf5_file(tmp_path):
 def test_python_objects_are_not_read(tmp_path):
     path = tmp_path / "objects.npz"
     np.savez(path, freq=FREQ_HZ, h=np.array([{"a": 1}], dtype=object))
-    assert "holds Python objects (h.npy), which are not read because that can run any program" in refused(path)
+    assert "holds Python objects (h.npy), which could run any program; save plain arrays" in refused(path)
 
 
 def test_numbers_of_the_other_byte_order(tmp_path):
@@ -311,13 +311,15 @@ def test_mixed_files(tmp_path):
     path = tmp_path / "mixed.uff"
     others = [dataset(151, *["x"] * 7).encode(), function(np.ones(3), function_type=1, number_type=4)]
     path.write_bytes(b"".join([*others, function(), *others]))
-    np.testing.assert_allclose(read_frfs(path).h[:, 0, 0], VALUES)
+    with pytest.warns(FileContentWarning, match=r"not read, no FRF: time history .* \(datasets 2, 5\)"):
+        np.testing.assert_allclose(read_frfs(path).h[:, 0, 0], VALUES)
     path.write_bytes(b"".join(others))
     assert "holds 1 time history" in refused(path)
     path = tmp_path / "mixed.mat"
     signal = structure_of_testlab(GIVEN, type_="Signal", values=GIVEN.h.real)
     write_mat(path, Signal=signal, FRF=structure_of_testlab(GIVEN, label="m/s^2/N"), text="März", n=3)
-    np.testing.assert_array_equal(read_frfs(path).h, GIVEN.h)
+    with pytest.warns(FileContentWarning, match=r"not read, no FRF: functions \(1 of type Signal\)"):
+        np.testing.assert_array_equal(read_frfs(path).h, GIVEN.h)
     assert "holds no FRF" in refused(write_mat(path, Signal=signal))
     assert "has no field for the frequencies" in refused(write_mat(path, text="März", n=3))
 
@@ -372,11 +374,14 @@ def test_files_beyond_a_limit_are_not_read(tmp_path, monkeypatch):
     path = tmp_path / "own.npz"
     write_npz(path, GIVEN)
     monkeypatch.setenv("JOINTFRF_FILE_LIMIT_GB", "1e-6")
-    assert "more than the 1e-06 GB that are read: limit_gb=, --limit-gb or the environment variable" in refused(path)
+    assert (
+        "more than the 1e-06 GB that are read; raise this limit by limit_gb=, --limit-gb or the environment variable"
+        in refused(path)
+    )
     monkeypatch.setenv("JOINTFRF_FILE_LIMIT_GB", "2")
     np.testing.assert_array_equal(read_frfs(path).h, GIVEN.h)
     monkeypatch.setenv("JOINTFRF_FILE_LIMIT_GB", "much")
-    with pytest.raises(FileContentError, match="JOINTFRF_FILE_LIMIT_GB is 'much': it must be a number of GB"):
+    with pytest.raises(FileContentError, match="JOINTFRF_FILE_LIMIT_GB is 'much'; set it to a number of GB"):
         read_frfs(path)
 
 
@@ -417,3 +422,43 @@ def test_no_file_of_any_kind_is_waited_for(tmp_path):
         os.mkfifo(pipe)
         with pytest.raises(FileContentError, match="is a pipe or a device, not a file"):
             read(pipe, "") if read is read_matrix else read(pipe)
+
+
+@pytest.mark.parametrize(
+    "name", ["freq_hz", "h", "responses", "quantity", "unit", "coherence", "nodes", "jointfrf_frfs"]
+)
+@pytest.mark.parametrize("layout", [1, 2])
+def test_a_group_in_place_of_a_dataset_is_one_sentence(tmp_path, name, layout):
+    """In the own layout, and in arrays of scripts."""
+    path = tmp_path / "a.h5"
+    write_hdf5(path, full_set())
+    with h5py.File(path, "r+") as file:
+        if layout == 1:
+            del file["sha256"]
+            file["jointfrf_frfs"][()] = 1
+        del file[name]
+        file.create_group(name)["inside"] = [1.0, 2.0]
+    assert f"{name} is a group, not an array; write the file again" in refused(path)
+
+
+def test_a_group_that_someone_added_is_damage_or_no_harm(tmp_path):
+    path = tmp_path / "a.h5"
+    write_hdf5(path, full_set())
+    with h5py.File(path, "r+") as file:
+        file.create_group("notes")["inside"] = [1.0, 2.0]
+    assert "was edited: its content does not fit its field sha256" in refused(path)
+    with h5py.File(path, "r+") as file:
+        del file["sha256"]
+        file["jointfrf_frfs"][()] = 1
+    np.testing.assert_array_equal(read_frfs(path).h, full_set().h)
+
+
+def test_a_group_named_by_a_mapping_is_one_sentence(tmp_path):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        for name, value in FIELDS.items():
+            file[name] = np.char.encode(value, "utf-8") if isinstance(value, list | str) else value
+        file["test/a"], file["test/b"] = GIVEN.h, GIVEN.h
+    np.testing.assert_array_equal(read_frfs(path, mapping={"h": "test.a"}).h, GIVEN.h)
+    with pytest.raises(FileContentError, match=r"test is a group; use one of test\.a, test\.b"):
+        read_frfs(path, mapping={"h": "test"})
