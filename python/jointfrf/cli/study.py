@@ -12,6 +12,7 @@ from jointfrf.cases.catalogue import UnknownCaseError
 from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import Output, UsageError, check_out, positive, progress, warn_of_ignored
 from jointfrf.extras import check_extras, import_extra
+from jointfrf.files import OwnFolder
 from jointfrf.parallel.pool import AnyExecutor, available_cores, check_processes, safe_environment
 from jointfrf.studies.design import Arrangement, StudyDesign, parse_factor
 from jointfrf.studies.result import StudyResult
@@ -96,7 +97,7 @@ def run(options: argparse.Namespace) -> int:
         out.give({"folder": str(found.folder), "missing": found.missing})
         return 0
     page = found.report()
-    files = {kind: getattr(found, f"save_{kind}")(found.folder / f"realisations.{kind}") for kind in options.values}
+    files = {kind: found.save_values(kind) for kind in options.values}
     out.say(found, "", *(f"{kind}: {path}" for kind, path in files.items()), f"report: {page}")
     written = {kind: str(path) for kind, path in files.items()}
     out.give({**found.to_dict(), "folder": str(found.folder), "report": str(page), **written})
@@ -122,7 +123,7 @@ def _studied(options: argparse.Namespace, is_part: bool) -> StudyResult:
         with _started(options.executor, options.jobs) as executor:
             return study(
                 case,
-                options.out or Path("studies") / name,
+                options.out or _usual_folder(name),
                 options.realisations,
                 design=design,
                 part=_range(options) if is_part else None,
@@ -132,6 +133,13 @@ def _studied(options: argparse.Namespace, is_part: bool) -> StudyResult:
             )
     except UnknownCaseError as error:
         raise UsageError(error) from error
+
+
+def _usual_folder(name: str) -> Path:
+    """Return the folder of a study that no option names, which must be no link: nobody has named what it leads to."""
+    folder = OwnFolder(Path("studies")) / name
+    folder.check()
+    return folder.path
 
 
 def _factors(words: list[str]) -> dict[str, Any]:
