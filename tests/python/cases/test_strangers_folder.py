@@ -4,8 +4,11 @@ import csv
 import html
 import io
 import os
+import re
 import subprocess
 import sys
+from base64 import b64encode
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +18,8 @@ import jointfrf as jf
 from command import run_command
 from jointfrf.cases.catalogue import find_case, run_case
 from jointfrf.io.cards import CardFormat
+from jointfrf.report.chart import Chart
+from jointfrf.report.document import Document, Section, Words, make_document
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Curve, Figure, Panel, figure_csv
 from jointfrf.report.table import Table, table_csv
@@ -115,6 +120,22 @@ def test_a_page_shows_no_text_of_another_folder(tmp_path, without_pictures):
     assert "Two masses and two masses" in page
 
 
+@pytest.mark.parametrize("has_chart", [True, False])
+def test_the_policy_of_a_page_allows_its_own_script_only(has_chart):
+    x = np.array([1.0, 2.0])
+    chart = Chart(Figure("key", "caption", (Panel("", "x", "y", (Curve("curve", x, x, "actual"),)),)))
+    page = make_document(Document("title", "", [Section("s", "S", [chart if has_chart else Words(["text"])])]))
+    (policy,) = re.findall(r'<meta http-equiv="Content-Security-Policy" content="([^"]*)">', page)
+    rules = dict(rule.split(" ", 1) for rule in html.unescape(policy).split("; "))
+    assert page.index("Content-Security-Policy") < page.index("<title>") < page.index("<style>")
+    scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    sums = [b64encode(sha256(script.encode()).digest()).decode() for script in scripts]
+    assert len(sums) == has_chart
+    assert rules.pop("script-src") == (f"'sha256-{sums[0]}'" if has_chart else "'none'")
+    assert rules == {"default-src": "'none'", "style-src": "'unsafe-inline'", "img-src": "data:",
+                     "base-uri": "'none'", "form-action": "'none'"}  # fmt: skip
+
+
 FORMULAS = ("=1+1", "+1+a", "-1+a", "@SUM(A1)", "\t=1", " =1")
 
 
@@ -164,6 +185,8 @@ def test_comments_of_cards_stay_comments(program):
 
 _DRAW = """
 import numpy as np
+from jointfrf.report.chart import Chart
+from jointfrf.report.document import Document, Section, Words, make_document
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Curve, Figure, Panel
 x = np.array([1.0, 2.0])
