@@ -123,7 +123,7 @@ def test_a_page_shows_no_text_of_another_folder(tmp_path, without_pictures):
 @pytest.mark.parametrize("has_chart", [True, False])
 def test_the_policy_of_a_page_allows_its_own_script_only(has_chart):
     x = np.array([1.0, 2.0])
-    chart = Chart(Figure("key", "caption", (Panel("", "x", "y", (Curve("curve", x, x, "actual"),)),)))
+    chart = Chart(Figure("key", "caption", (Panel("", "x", "y", (Curve("curve", x, x, "actual"),)),)), "in words")
     page = make_document(Document("title", "", [Section("s", "S", [chart if has_chart else Words(["text"])])]))
     (policy,) = re.findall(r'<meta http-equiv="Content-Security-Policy" content="([^"]*)">', page)
     rules = dict(rule.split(" ", 1) for rule in html.unescape(policy).split("; "))
