@@ -154,8 +154,8 @@ def find_case(word: str) -> Path:
             return folder
     names = ", ".join(folder.name for folder in known) or "none"
     if Path(word).is_dir():
-        raise UnknownCaseError(f"the folder {word} holds no case.toml; known cases: {names}")
-    raise UnknownCaseError(f"there is no case {word!r}; known cases: {names}; or name a folder with a case.toml")
+        raise UnknownCaseError(f"the folder {word} has no case.toml; name another folder, or one of the cases {names}")
+    raise UnknownCaseError(f"unknown case {word!r}; name a folder with a case.toml, or one of the cases {names}")
 
 
 def read_case(folder: Path, kinds: Mapping[str, CaseKind[Any, Any]] = KINDS) -> Case:

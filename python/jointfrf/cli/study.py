@@ -14,6 +14,7 @@ from jointfrf.cli.usage import Output, UsageError, check_out, positive, progress
 from jointfrf.extras import check_extras, import_extra
 from jointfrf.files import OwnFolder
 from jointfrf.parallel.pool import AnyExecutor, available_cores, check_processes, safe_environment
+from jointfrf.spelling import some_of
 from jointfrf.studies.design import Arrangement, StudyDesign, parse_factor
 from jointfrf.studies.result import StudyResult
 from jointfrf.studies.run import merge_studies, study
@@ -106,14 +107,14 @@ def run(options: argparse.Namespace) -> int:
 
 def _merged(options: argparse.Namespace) -> StudyResult:
     if len(options.words) < 2 or options.out is None:
-        raise UsageError("merge needs the folders of parts, and --out DIR")
+        raise UsageError("merge without parts or --out; name the folders of parts, and --out DIR")
     warn_of_ignored(options, _OF_COMPUTING, "merge computes nothing")
     return merge_studies(options.words[1:], options.out)
 
 
 def _studied(options: argparse.Namespace, is_part: bool) -> StudyResult:
     if len(options.words) > 1:
-        raise UsageError(f"one case at a time, not {' and '.join(options.words)}")
+        raise UsageError(f"several cases, {some_of(options.words, 3)}; name one")
     (case,) = options.words
     factors = _factors(options.factor)
     try:
@@ -150,14 +151,14 @@ def _factors(words: list[str]) -> dict[str, Any]:
         except ValueError as error:
             raise UsageError(f"--factor: {error}") from error
         if name in factors:
-            raise UsageError(f"--factor: {name} is given twice")
+            raise UsageError(f"--factor {name} is given twice; give all values in one")
         factors[name] = values
     return factors
 
 
 def _range(options: argparse.Namespace) -> range:
     if options.first is None or options.count is None:
-        raise UsageError("--first and --count belong together")
+        raise UsageError("--first without --count, or --count without --first; give both")
     return range(options.first, options.first + options.count)
 
 

@@ -272,7 +272,7 @@ def _prepared(folder: Path, design: StudyDesign, realisations: int | None) -> tu
     seen = None
     for point, case, kind in design.cases(folder):
         if kind.groups is None:
-            raise ValueError(f"cases of kind {kind.name} cannot be studied")
+            raise ValueError(f"a case of kind {kind.name} has no study; use a case of another kind")
         try:
             own = kind.groups(case, design.choice)
         except ValueError as error:
@@ -298,8 +298,7 @@ def _wanted(part: range | None, realisations: int) -> Span:
     check_type("part", part, range)
     if part.step != 1 or not len(part) or part.start < 0 or part.stop > realisations:
         raise ValueError(
-            f"a part must be realisations in a row, at least one, from 0 to {realisations - 1}, not {part.start} to "
-            f"{part.stop - 1}"
+            f"part is {one_line(part)}; give at least one realisation, in steps of 1, within range({realisations})"
         )
     return Span(part.start, len(part))
 
@@ -338,10 +337,10 @@ def merge_studies(parts: Sequence[str | Path], out: str | Path) -> StudyResult:
     0
     """
     if isinstance(parts, str | Path) or not isinstance(parts, Iterable):
-        raise TypeError(f"parts must be a list of folders, not {one_line(parts)}")
+        raise TypeError(f"parts is {one_line(parts)}; give a list of folders")
     stores, target = [StudyStore(Path(part)) for part in parts], StudyStore(Path(out))
     if not stores:
-        raise ValueError("no part of a study was named")
+        raise ValueError("parts is empty; name at least one folder")
     first = stores[0].read()
     known = [target] if target.exists else []
     records = [one.check(first.identity) for one in (*stores, *known)]

@@ -164,12 +164,16 @@ class StudyStore:
                 ReadLimit(path).take(_JSON_TIMES * os.fstat(file.fileno()).st_size)
                 content = file.read()
         except (FileNotFoundError, NotADirectoryError) as error:
-            raise FileContentError(f"{self.folder} holds no study: there is no study.json in it") from error
+            raise FileContentError(
+                f"{self.folder} holds no study, as it has no study.json: name the folder of a study"
+            ) from error
         try:
             held = json.loads(content)
             if isinstance(held, dict) and held.get("format", _FORMAT) != _FORMAT:
                 version = one_line(held["format"])
-                raise FileContentError(f"{path}: format {version} was written by another version of jointfrf")
+                raise FileContentError(
+                    f"{path}: format {version} was written by another version of jointfrf: name another folder"
+                )
             checked = msgspec.convert(held, _HeldStudy)
             groups = tuple(
                 GroupRecord(one.point, one.noise, tuple(map(_column, one.columns))) for one in checked.groups
