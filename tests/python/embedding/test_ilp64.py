@@ -107,6 +107,28 @@ def test_hosts_that_spell_symbols_otherwise(libraries, tmp_path, n_bytes, option
     assert "libjointfrf" not in run(["readelf", "-d", tmp_path / "static"])
 
 
+@pytest.mark.skipif(shutil.which("patch") is None, reason="needs patch")
+@pytest.mark.parametrize("option", ["", "-fsecond-underscore"])
+def test_a_program_with_a_joint_prints_the_same_with_long_integers(libraries, tmp_path, option):
+    """The plane frames of tests/f77, whose COMMON blocks, work arrays and calls all have the longer integers."""
+    folder = tmp_path / "f77"
+    folder.mkdir()
+    for name in ("frame.f", "frame.inc", "frame.deck", "README.md"):
+        shutil.copy(TESTS / "f77" / name, folder)
+    run(["patch", "-p1", "-i", TESTS / "f77" / "frame-joint.patch"], cwd=folder)
+    cards = [line for line in (folder / "README.md").read_text().splitlines() if line.startswith("JOINT ")]
+    deck = (folder / "frame.deck").read_text().replace("END\n", "\n".join([*cards, "END\n"]))
+    texts = []
+    for n_bytes, library in libraries.items():
+        program, options = tmp_path / f"frame{n_bytes}", [*option.split(), *default_integer(n_bytes, ".f")]
+        flags = [*library.pkg_config("--cflags", "--libs"), f"-Wl,-rpath,{library.pkg_config('--variable=libdir')[0]}"]
+        run([*COMPILERS[".f"], "-O2", "-ffp-contract=off", *options, "frame.f", "-o", program, *flags], cwd=folder)
+        texts.append(run([program], input=deck))
+    assert cards
+    assert len(texts[0].splitlines()) > 900
+    assert texts[0] == texts[1]
+
+
 @pytest.mark.skipif(shutil.which("cmake") is None or shutil.which("ctest") is None, reason="needs CMake")
 def test_cmake(libraries, tmp_path):
     flags = ["-DVARIANT=jointfrf64", "-DCMAKE_Fortran_FLAGS=-fdefault-integer-8"]
