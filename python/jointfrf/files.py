@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import secrets
@@ -11,17 +12,20 @@ import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 from jointfrf.errors import FileContentError, first_line
 
 __all__ = [
     "HEAD",
     "LIMIT_VARIABLE",
+    "OwnFolder",
     "ReadLimit",
-    "below",
     "check_file",
     "check_stated",
+    "clean_name",
     "damage_named",
     "head_of",
     "text_of",
@@ -158,7 +162,11 @@ def check_file(path: Path, limit_gb: float | None = None) -> None:
     if not path.is_file():
         # Opening a pipe waits for a writer; a device has no end.
         raise FileContentError(f"{path} is a pipe or a device, not a file; save its content and name that file")
-    limit, size = _limit_gb(limit_gb) or _LARGEST, path.stat().st_size / 1e9
+    _check_size(path, path.stat().st_size, limit_gb)
+
+
+def _check_size(path: Path, size_bytes: int, limit_gb: float | None = None) -> None:
+    limit, size = _limit_gb(limit_gb) or _LARGEST, size_bytes / 1e9
     if size > limit:
         raise FileContentError(f"{path} has {size:.3g} GB, more than the {limit:.3g} GB that are read; {_RAISED}")
 
@@ -242,41 +250,218 @@ def text_of(path: Path) -> str:
         return content.decode("latin-1")
 
 
-def below(folder: Path, name: str, suffix: str = "") -> Path:
-    """Return the path of a file in a folder, by a name that may come from a stranger.
+def clean_name(name: str, suffix: str = "") -> str:
+    """Return the name of a file for a text that may come from a stranger.
 
     Parameters
     ----------
-    folder : Path
     name : str
-        Where it has characters that are unusual in names of files (all but letters and digits of ASCII and ``_+,=.-``),
-        begins with a point or is long, these are replaced and a checksum is added, so that two names stay two.
+        Characters that are unusual in names of files (all but letters and digits of ASCII and ``_+,=.-``), a point at
+        the beginning and the end of a long name are replaced; a checksum is then added, so that two names stay two.
     suffix : str
-        Of the file, with its point.
+        Suffix of the file, with its point.
 
     Returns
     -------
-    Path
-        Directly in the folder.
-
-    Raises
-    ------
-    FileContentError
-        There is a link of this name which leads out of the folder.
+    str
+        A name without folders.
 
     Examples
     --------
-    >>> below(Path("figures"), "k-theta").as_posix(), below(Path("figures"), "../../x", ".png").as_posix()
-    ('figures/k-theta', 'figures/_._.._x-422533a8.png')
+    >>> clean_name("k-theta"), clean_name("../../x", ".png")
+    ('k-theta', '_._.._x-422533a8.png')
     """
     clean = _UNUSUAL.sub("_", name)[:_LONGEST]
     clean = f"_{clean[1:]}" if clean[:1] in ("", ".", "-") else clean
     if clean != name:
         clean += f"-{zlib.crc32(name.encode('utf-8', 'surrogatepass')):08x}"
-    path = folder / f"{clean}{suffix}"
-    if path.resolve().parent != folder.resolve():
-        raise FileContentError(f"{path} is a link out of its folder, to which nothing is written; remove it")
-    return path
+    return f"{clean}{suffix}"
+
+
+#: Flags of `os.open`, those that this system has: a link is not followed, a pipe is not waited for.
+_READ = sum(getattr(os, name, 0) for name in ("O_RDONLY", "O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
+_CREATE = sum(getattr(os, name, 0) for name in ("O_WRONLY", "O_CREAT", "O_EXCL", "O_NOFOLLOW", "O_CLOEXEC", "O_BINARY"))
+_FOLDER = sum(getattr(os, name, 0) for name in ("O_RDONLY", "O_DIRECTORY", "O_CLOEXEC"))
+#: Whether files are opened relative to an open folder, which nobody can exchange for a link meanwhile.
+_HAS_PLACES = os.open in os.supports_dir_fd and os.rename in os.supports_dir_fd
+
+
+@dataclass(frozen=True)
+class OwnFolder:
+    """A folder of results that may come from a stranger: no link in it is followed, to read or to write.
+
+    Attributes
+    ----------
+    base : Path
+        Folder that the user named; it may be a link.
+    inner : tuple of str
+        Folders in it, each in the one before; none of them may be a link.
+    """
+
+    base: Path
+    inner: tuple[str, ...] = ()
+
+    def __truediv__(self, name: str) -> OwnFolder:
+        """Return a folder in this one."""
+        return OwnFolder(self.base, (*self.inner, name))
+
+    @property
+    def path(self) -> Path:
+        """The path, for messages; opening it follows links."""
+        return self.base.joinpath(*self.inner)
+
+    def make(self) -> OwnFolder:
+        """Make the folder, unless it exists, and return it.
+
+        Raises
+        ------
+        FileContentError
+            It, or a folder between it and `base`, is a link or no folder.
+        """
+        self.base.mkdir(parents=True, exist_ok=True)
+        for depth in range(len(self.inner)):
+            outer, name = OwnFolder(self.base, self.inner[:depth]), self.inner[depth]
+            with outer._entered() as place, _named(outer.path / name, name), suppress(FileExistsError):
+                os.mkdir(outer._at(place, name), dir_fd=place)
+        self.check()
+        return self
+
+    def check(self) -> None:
+        """Raise a FileContentError if it, or a folder between it and `base`, is a link or no folder."""
+        with suppress(FileNotFoundError), self._entered():
+            pass
+
+    def entries(self) -> dict[str, os.stat_result]:
+        """Return the names in the folder, with the status of each or of the link; none if there is no such folder."""
+        with (
+            suppress(FileNotFoundError),
+            self._entered() as place,
+            os.scandir(self.path if place is None else place) as found,
+        ):
+            return {one.name: one.stat(follow_symlinks=False) for one in found}
+        return {}
+
+    @contextmanager
+    def opened(self, name: str) -> Iterator[BinaryIO]:
+        """Open a file for reading.
+
+        Raises
+        ------
+        FileContentError
+            It is a link, a folder, a pipe or a device, or larger than `check_file` allows.
+        FileNotFoundError
+            There is no such file.
+        """
+        path = self.path / name
+        with self._entered() as place:
+            with _named(path, name):
+                self._status(place, name)
+                handle = os.open(self._at(place, name), _READ, dir_fd=place)
+            with os.fdopen(handle, "rb") as file:
+                status = os.fstat(handle)
+                _check_own(path, status)
+                _check_size(path, status.st_size)
+                yield file
+
+    @contextmanager
+    def written(self, name: str) -> Iterator[BinaryIO]:
+        """Give a new file to write into, and move it to its place at the end, as `written_whole` does.
+
+        Raises
+        ------
+        FileContentError
+            A link, a folder, a pipe or a device is in its place.
+        OSError
+            The file cannot be written; nothing is left behind.
+        """
+        path, temporary = self.path / name, _temporary_name(self.path, name)
+        with self._entered() as place, _named(path, name, temporary):
+            try:
+                older = self._status(place, name)
+            except FileNotFoundError:
+                older = None
+            mode = 0o600 if older is not None else 0o666
+            handle = os.open(self._at(place, temporary), _CREATE, mode, dir_fd=place)
+            try:
+                with os.fdopen(handle, "wb") as file:
+                    yield file
+                    file.flush()
+                    os.fsync(handle)
+                    if older is not None:
+                        _keep(self.path / temporary if place is None else handle, older)
+                at = self._at(place, temporary), self._at(place, name)
+                os.replace(*at, src_dir_fd=place, dst_dir_fd=place)
+            except BaseException:
+                with suppress(FileNotFoundError):
+                    os.unlink(self._at(place, temporary), dir_fd=place)
+                raise
+
+    def write(self, name: str, content: str | bytes) -> Path:
+        """Write a file whole or not at all, text as UTF-8, and return its path; errors as for `written`."""
+        with self.written(name) as file:
+            file.write(content.encode("utf-8") if isinstance(content, str) else content)
+        return self.path / name
+
+    @contextmanager
+    def _entered(self) -> Iterator[int | None]:
+        """Open the folder, each part in the one before; None where the system opens nothing relative to a folder."""
+        if not _HAS_PLACES:
+            for depth in range(len(self.inner)):
+                part = self.base.joinpath(*self.inner[: depth + 1])
+                if part.is_symlink() or not part.is_dir():
+                    part.lstat()
+                    raise _not_own(part, "a link or no folder", "a folder")
+            yield None
+            return
+        with _named(self.base, str(self.base)):
+            place = os.open(self.base, _FOLDER)
+        try:
+            for depth, part_name in enumerate(self.inner):
+                part = self.base.joinpath(*self.inner[: depth + 1])
+                try:
+                    with _named(part, part_name):
+                        inner = os.open(part_name, _FOLDER | os.O_NOFOLLOW, dir_fd=place)
+                except OSError as error:
+                    if error.errno in (errno.ELOOP, errno.ENOTDIR):
+                        raise _not_own(part, "a link or no folder", "a folder") from error
+                    raise
+                os.close(place)
+                place = inner
+            yield place
+        finally:
+            os.close(place)
+
+    def _at(self, place: int | None, name: str) -> str:
+        """Return how functions of `os` name what is directly in the folder."""
+        if not name or Path(name).name != name:
+            raise ValueError(f"{name!r} is not a name: make one by clean_name")
+        return name if place is not None else str(self.path / name)
+
+    def _status(self, place: int | None, name: str) -> os.stat_result:
+        status = os.stat(self._at(place, name), dir_fd=place, follow_symlinks=False)
+        _check_own(self.path / name, status)
+        return status
+
+
+@contextmanager
+def _named(path: Path, *names: str) -> Iterator[None]:
+    """Let errors of the system that name nothing, or one of these names, name this path."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno is None or error.filename not in (None, *names):
+            raise
+        raise type(error)(error.errno, error.strerror, str(path)) from error
+
+
+def _check_own(path: Path, status: os.stat_result) -> None:
+    if not stat.S_ISREG(status.st_mode):
+        is_folder, is_link = stat.S_ISDIR(status.st_mode), stat.S_ISLNK(status.st_mode)
+        raise _not_own(path, "a link" if is_link else "a folder" if is_folder else "a pipe or a device", "a file")
+
+
+def _not_own(path: Path, kind: str, wanted: str) -> FileContentError:
+    return FileContentError(f"{path} is {kind}, not {wanted} of its own: remove it; nothing is read or written there")
 
 
 def write_file(path: Path, content: str | bytes) -> None:
@@ -361,6 +546,13 @@ def _followed(path: Path) -> Path:
 
 def _created(folder: Path, name: str, *, private: bool) -> Path:
     """Create a file of a new name; the mask of the process, or what the folder says, gives its mode."""
+    path = folder / _temporary_name(folder, name)
+    os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600 if private else 0o666))
+    return path
+
+
+def _temporary_name(folder: Path, name: str) -> str:
+    """Return a new name for a file that will be called `name`, no longer than the file system takes."""
     try:
         longest = os.pathconf(folder, "PC_NAME_MAX")
     except (AttributeError, OSError, ValueError):
@@ -368,20 +560,18 @@ def _created(folder: Path, name: str, *, private: bool) -> Path:
     end = f".{secrets.token_hex(8)}"
     while len(os.fsencode(name)) + len(end) + 1 > longest:
         name = name[:-1]
-    path = folder / f".{name}{end}"
-    os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600 if private else 0o666))
-    return path
+    return f".{name}{end}"
 
 
-def _keep(path: Path, older: os.stat_result) -> None:
-    """Give a file the owner and the mode of an older one; without the right to, its group, or only the mode."""
+def _keep(path: Path | int, older: os.stat_result) -> None:
+    """Give a file, or an open one, the owner and the mode of an older one; without the right to, its group or mode."""
     mode = stat.S_IMODE(older.st_mode)
     if hasattr(os, "chown"):
         for owner in (older.st_uid, -1):
             with suppress(PermissionError):
                 os.chown(path, owner, older.st_gid)
                 break
-    own = path.stat()
+    own = os.stat(path)
     if (own.st_uid, own.st_gid) != (older.st_uid, older.st_gid):
         mode &= 0o777  # setuid and setgid are not passed on to another owner
-    path.chmod(mode)
+    os.chmod(path, mode)

@@ -27,11 +27,12 @@ __all__ = ["DRILLS", "ROOT", "disk_full", "kills", "run_drill", "run_kills", "se
 
 ROOT = Path(__file__).resolve().parents[2]
 _SUFFIXES = ("uff", "npz", "h5", "csv")
-#: Writes files of FRFs of growing content, over and over.
+#: Writes files of FRFs of growing content, and one into a folder of results, over and over.
 _WRITER = """
 import sys
 from pathlib import Path
 import numpy as np
+from jointfrf.files import OwnFolder
 from jointfrf.io import Channel, FrfSet, write_csv, write_hdf5, write_npz, write_uff
 folder, n = Path(sys.argv[1]), int(sys.argv[2])
 at = tuple(Channel(i, "+y") for i in (1, 2, 3))
@@ -40,6 +41,7 @@ for k in range(1, n):
     frfs = FrfSet(np.arange(1.0, 301.0), at, at, np.full((300, 3, 3), k + 1j))
     for suffix, function in write.items():
         function(folder / f"a.{suffix}", frfs)
+    (OwnFolder(folder) / "results").make().write("a.txt", f"{k:07d}" * 10_000)
     if k == 1:
         print("begun", flush=True)
 """
@@ -82,6 +84,9 @@ def kills(count: int, found: Found) -> None:
                 if len(set(h.ravel().tolist())) != 1:
                     found.broken.append(f"killed while it wrote: {path.name} is of two writes")
                 found.counts["killed, the file is whole"] += 1
+            text = (Path(folder) / "results" / "a.txt").read_text()
+            if text != text[:7] * 10_000:
+                found.broken.append("killed while it wrote: a.txt is of two writes")
 
 
 def run_kills(count: int, found: Found) -> None:

@@ -8,7 +8,7 @@ import re
 import sys
 from collections.abc import Sequence
 
-from generate import c_header, include_file, reference, signatures, work_forms
+from generate import c_header, include_file, reference, signatures, symbols, work_forms
 from generate.reader import read_api
 from generate.routines import Api
 from generate.source import ConventionError, Source
@@ -36,6 +36,8 @@ def generate(api: Api, options: argparse.Namespace) -> None:
         write(options.output, work_forms.write(api))
     elif options.what == "signatures":
         write(options.output, signatures.write(api))
+    elif options.what == "symbols":
+        write(options.output, symbols.write(api))
     else:
         header = options.what == "header"
         values = c_header.values(api) if header else include_file.values(api, options.integer_bytes)
@@ -45,7 +47,7 @@ def generate(api: Api, options: argparse.Namespace) -> None:
 def main(arguments: Sequence[str]) -> int:
     """Run the command; 1 and one sentence where a source does not follow the conventions."""
     parser = argparse.ArgumentParser(prog="generate")
-    parser.add_argument("what", choices=["header", "include", "work", "signatures", "reference", "names"])
+    parser.add_argument("what", choices=["header", "include", "work", "signatures", "symbols", "reference", "names"])
     parser.add_argument("--template", type=pathlib.Path, help="of header or include file")
     parser.add_argument("--integer-bytes", type=int, choices=[4, 8], default=4, help="for the include file")
     parser.add_argument("--version", default="", help="for the reference")

@@ -6,8 +6,8 @@ import textwrap
 
 from generate.routines import Api
 
-#: By the bytes of an integer: the library, the other one, and what divides by zero where default integers are others.
-VARIANTS = {4: ("jointfrf", "jointfrf64", "32/BIT_SIZE(0)"), 8: ("jointfrf64", "jointfrf", "BIT_SIZE(0)/64")}
+#: By the bytes of an integer: the library, the other one with its bytes, and digits that integers of these bytes have.
+VARIANTS = {4: ("jointfrf", "jointfrf64", "8", "18"), 8: ("jointfrf64", "jointfrf", "4", "9")}
 
 
 def values(api: Api, integer_bytes: int) -> dict[str, str]:
@@ -17,5 +17,13 @@ def values(api: Api, integer_bytes: int) -> dict[str, str]:
         lines += textwrap.wrap(group.text, 72, initial_indent="! ", subsequent_indent="! ")
         for name, value in group.values.items():
             lines += [f"      INTEGER {name}", f"      PARAMETER ({name} = {value})"]
-    name, other, share = VARIANTS[integer_bytes]
-    return {"constants": "\n".join(lines), "name": name, "other": other, "bytes": str(integer_bytes), "share": share}
+    name, other, other_bytes, digits = VARIANTS[integer_bytes]
+    return {
+        "constants": "\n".join(lines),
+        "name": name,
+        "bytes": str(integer_bytes),
+        "other": other,
+        "link_other": other.upper(),
+        "other_bytes": other_bytes,
+        "digits": digits,
+    }

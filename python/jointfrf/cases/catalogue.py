@@ -14,7 +14,7 @@ from jointfrf.cases.comparison import verdict_sentence
 from jointfrf.cases.keys import Case, CaseKeys, ExpectedKeys
 from jointfrf.cases.kind import CaseKind
 from jointfrf.cases.workers import Workers
-from jointfrf.files import below, check_file, check_stated, write_file
+from jointfrf.files import OwnFolder, check_stated, clean_name
 from jointfrf.report.document import Document, Page, make_document
 from jointfrf.report.draw import Drawing, draw
 from jointfrf.report.figure import Figure, figure_csv
@@ -156,8 +156,8 @@ def find_case(word: str) -> Path:
             return folder
     names = ", ".join(folder.name for folder in known) or "none"
     if Path(word).is_dir():
-        raise UnknownCaseError(f"the folder {word} holds no case.toml; known cases: {names}")
-    raise UnknownCaseError(f"there is no case {word!r}; known cases: {names}; or name a folder with a case.toml")
+        raise UnknownCaseError(f"the folder {word} has no case.toml; name another folder, or one of the cases {names}")
+    raise UnknownCaseError(f"unknown case {word!r}; name a folder with a case.toml, or one of the cases {names}")
 
 
 def read_case(folder: Path, kinds: Mapping[str, CaseKind[Any, Any]] = KINDS) -> Case:
@@ -295,9 +295,9 @@ def run_case(
     if realisations is None:
         stated = f"{case.folder / 'case.toml'}: realisations = {case.realisations}"
         check_stated(stated, _REALISATION * case.realisations)
-    target = Path(out) / case.name
+    target = OwnFolder(Path(out)) / case.name
     for inner in ("tables", "figures"):
-        below(target, inner).mkdir(parents=True, exist_ok=True)
+        (target / inner).make()
     count = case.realisations if realisations is None else realisations
     result = kind.compute(case, count, at_work)
     tables = kind.tables(result)
@@ -319,29 +319,26 @@ def run_case(
         text=_text(case.folder, "README.md"),
         sources=[("case.toml", _text(case.folder, "case.toml"))],
     )
-    write_results(target, page.document, tables, page.figures, content)
-    return CaseOutput(case, result, tables, figures, summary, target / "report.html", printed)
+    report = write_results(target, page.document, tables, page.figures, content)
+    return CaseOutput(case, result, tables, figures, summary, report, printed)
 
 
 def write_results(
-    folder: Path,
+    folder: OwnFolder,
     document: Document,
     tables: Sequence[Table],
     figures: Sequence[tuple[Figure, Drawing]],
     content: Mapping[str, Any],
 ) -> Path:
     """Write a page and, beside it, its tables, figures and numbers; return the path of the page."""
-    for inner in ("tables", "figures"):
-        below(folder, inner).mkdir(parents=True, exist_ok=True)
+    drawings, numbers = (folder / "figures").make(), (folder / "tables").make()
     for figure, drawing in figures:
-        write_file(below(folder / "figures", figure.key, ".png"), drawing.png)
-        write_file(below(folder / "figures", figure.key, ".svg"), drawing.svg)
-        write_file(below(folder / "figures", figure.key, ".csv"), figure_csv(figure))
+        for suffix, held in ((".png", drawing.png), (".svg", drawing.svg), (".csv", figure_csv(figure))):
+            drawings.write(clean_name(figure.key, suffix), held)
     for table in tables:
-        write_file(below(folder / "tables", table.key, ".csv"), table_csv(table))
-    write_file(below(folder, "results.json"), json.dumps(content, indent=1) + "\n")
-    write_file(below(folder, "report.html"), make_document(document))
-    return folder / "report.html"
+        numbers.write(clean_name(table.key, ".csv"), table_csv(table))
+    folder.write("results.json", json.dumps(content, indent=1) + "\n")
+    return folder.write("report.html", make_document(document))
 
 
 def _about(case: Case, count: int) -> str:
@@ -356,11 +353,10 @@ def _about(case: Case, count: int) -> str:
 
 def _text(folder: Path, name: str) -> str:
     """Return a text of the folder of a case, for its page; not that of another folder, by a link."""
-    path = folder / name
-    if not path.is_file() or path.resolve().parent != folder.resolve():
+    if not (folder / name).is_file() or (folder / name).is_symlink():
         return ""
-    check_file(path)
-    return path.read_text(encoding="utf-8", errors="replace")
+    with OwnFolder(folder).opened(name) as file:
+        return file.read().decode("utf-8", errors="replace")
 
 
 def _common_numbers(case: Case, count: int, tables: list[Table]) -> dict[str, Any]:

@@ -404,11 +404,7 @@ def joints_of(dofs: Sequence[JointDofKeys], needed_by: str = "") -> tuple[Joint,
     for one in dofs:
         named = "rotation" if is_rotation(one.dof) else "translation"
         if one.motion not in (None, named):
-            raise one.error(
-                "motion",
-                f"{named!r}, which is what the name {one.dof!r} of the DOF says (name a rotation like theta, theta_x, "
-                "rx or Mtheta_x, a translation like x, ux or Fx)",
-            )
+            raise one.error("motion", f"{named!r}, as the name {one.dof!r} states")
         lacking = [name for name in ("initial_stiffness", "initial_damping") if getattr(one, name) is None]
         if needed_by and lacking:
             raise one.missing(lacking, f"{needed_by} begins with a first estimate")
@@ -439,6 +435,6 @@ def check_noises(keys: Keys, noises: Sequence[Noise], n: int) -> None:
     for noise in noises:
         if noise.level > _HIGH_LEVEL and not noise.confirm_level:
             percent = f"{noise.level:g} is noise of {100 * noise.level:g} % (5 % is 0.05)"
-            raise noise.wrong("level", f"{percent}; if that is meant, say confirm_level = true")
+            raise noise.wrong("level", f"{percent}; correct it, or set confirm_level = true")
         if n % noise.block:
             raise noise.error("block", f"a divisor of {n}, the number of joint DOFs")

@@ -137,9 +137,7 @@ def chosen_noises(noises: Sequence[Noise], choice: StudyChoice) -> list[Noise]:
     names = [noise.name for noise in noises]
     for name in choice.noises:
         if name not in names:
-            raise ValueError(
-                f"the case has no noise {name!r}{did_you_mean(name, names) or ': it has ' + ', '.join(names)}"
-            )
+            raise ValueError(f"unknown noise {name!r}{did_you_mean(name, names) or '; use one of ' + ', '.join(names)}")
     return [noise for noise in noises if noise.name in choice.noises or not choice.noises]
 
 

@@ -40,7 +40,7 @@ class Structure(ABC):
 def _check_once(names: Sequence[str]) -> None:
     twice = [name for i, name in enumerate(names) if name in names[:i]]
     if twice:
-        raise ValueError(f"the joint DOF {twice[0]!r} is named twice")
+        raise ValueError(f"the joint DOF {twice[0]!r} is named twice; name each DOF once")
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class MeasuredStructure(Structure):
         h = self.frfs.matrix(channels, channels)
         for i, channel in enumerate(channels):
             if not h[:, i, i].any():
-                raise ValueError(f"{self.frfs.source}: the FRF {channel} / {channel} is zero on all lines")
+                raise ValueError(f"{self.frfs.source}: the FRF {channel} / {channel} is zero on all lines; check it")
 
     def receptance(self, freq_hz: FloatArray, points: Sequence[str]) -> ComplexArray:
         """Return the receptances on lines that the set holds."""
@@ -129,8 +129,7 @@ class MeasuredStructure(Structure):
             first = int(np.argmax(missing))
             raise ValueError(
                 f"{self.frfs.source} has no line at {freq_hz[first]:g} Hz, the nearest is {held[nearest[first]]:g} Hz "
-                f"({int(missing.sum())} of {freq_hz.size} lines are missing); [frequency] can take the lines of a file "
-                "by from_file"
+                f"({int(missing.sum())} of {freq_hz.size} lines are missing); set from_file in [frequency]"
             )
         return [int(line) for line in nearest]
 

@@ -11,7 +11,7 @@ from jointfrf.assembly_file.keys import AssemblyKeys, PartsKeys
 from jointfrf.assembly_file.template import TEMPLATE
 from jointfrf.cases.catalogue import KINDS
 from jointfrf.cli.usage import Output, UsageError
-from jointfrf.files import write_file
+from jointfrf.files import OwnFolder
 from jointfrf.toml.documents import key_template, schema_of
 
 __all__ = ["add_arguments", "run"]
@@ -52,9 +52,9 @@ def run(options: argparse.Namespace) -> int:
         raise UsageError(f"{case} exists: name another folder")
     design = {"study": {"realisations": 20, "factors": {"noise": [0.01, 0.05], "lines": [50, 200]}}}
     examples = {**top.examples, **(design if is_study else {})}
-    folder.mkdir(parents=True, exist_ok=True)
-    write_file(folder / _SCHEMA, schema)
-    write_file(case, key_template(top, f"#:schema ./{_SCHEMA}", examples))
+    own = OwnFolder(folder).make()
+    own.write(_SCHEMA, schema)
+    own.write(case.name, key_template(top, f"#:schema ./{_SCHEMA}", examples))
     command = f"jointfrf {'study' if is_study else 'run'} {folder}"
     out = Output(options)
     out.say(f"wrote {case} and {folder / _SCHEMA}; edit it, then: {command}")
@@ -71,9 +71,9 @@ def _new_assembly(options: argparse.Namespace) -> int:
     path, beside = folder / "assembly.toml", folder / "assembly.schema.json"
     if path.exists() or path.is_symlink():
         raise UsageError(f"{path} exists: name another folder")
-    folder.mkdir(parents=True, exist_ok=True)
-    write_file(beside, schema)
-    write_file(path, TEMPLATE)
+    own = OwnFolder(folder).make()
+    own.write(beside.name, schema)
+    own.write(path.name, TEMPLATE)
     command = f"jointfrf identify TEST.uff --model {path}"
     out = Output(options)
     out.say(f"wrote {path} and {beside}; edit it, then: {command}")

@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
         raise UsageError("no cases come with this installation: name a folder with a case.toml")
     twice = {folder.name for folder in folders if [f.name for f in folders].count(folder.name) > 1}
     if twice:
-        raise UsageError(f"two cases are called {min(twice)}: their results would overwrite each other")
+        raise UsageError(f"two cases are called {min(twice)}; run each with its own --out")
     out = Output(options)
 
     def say(text: str) -> None:

@@ -12,7 +12,9 @@ from jointfrf.cases.catalogue import UnknownCaseError
 from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import Output, UsageError, check_out, positive, progress, warn_of_ignored
 from jointfrf.extras import check_extras, import_extra
+from jointfrf.files import OwnFolder
 from jointfrf.parallel.pool import AnyExecutor, available_cores, check_processes, safe_environment
+from jointfrf.spelling import some_of
 from jointfrf.studies.design import Arrangement, StudyDesign, parse_factor
 from jointfrf.studies.result import StudyResult
 from jointfrf.studies.run import merge_studies, study
@@ -96,7 +98,7 @@ def run(options: argparse.Namespace) -> int:
         out.give({"folder": str(found.folder), "missing": found.missing})
         return 0
     page = found.report()
-    files = {kind: getattr(found, f"save_{kind}")(found.folder / f"realisations.{kind}") for kind in options.values}
+    files = {kind: found.save_values(kind) for kind in options.values}
     out.say(found, "", *(f"{kind}: {path}" for kind, path in files.items()), f"report: {page}")
     written = {kind: str(path) for kind, path in files.items()}
     out.give({**found.to_dict(), "folder": str(found.folder), "report": str(page), **written})
@@ -105,14 +107,14 @@ def run(options: argparse.Namespace) -> int:
 
 def _merged(options: argparse.Namespace) -> StudyResult:
     if len(options.words) < 2 or options.out is None:
-        raise UsageError("merge needs the folders of parts, and --out DIR")
+        raise UsageError("merge without parts or --out; name the folders of parts, and --out DIR")
     warn_of_ignored(options, _OF_COMPUTING, "merge computes nothing")
     return merge_studies(options.words[1:], options.out)
 
 
 def _studied(options: argparse.Namespace, is_part: bool) -> StudyResult:
     if len(options.words) > 1:
-        raise UsageError(f"one case at a time, not {' and '.join(options.words)}")
+        raise UsageError(f"several cases, {some_of(options.words, 3)}; name one")
     (case,) = options.words
     factors = _factors(options.factor)
     try:
@@ -122,7 +124,7 @@ def _studied(options: argparse.Namespace, is_part: bool) -> StudyResult:
         with _started(options.executor, options.jobs) as executor:
             return study(
                 case,
-                options.out or Path("studies") / name,
+                options.out or _usual_folder(name),
                 options.realisations,
                 design=design,
                 part=_range(options) if is_part else None,
@@ -134,6 +136,13 @@ def _studied(options: argparse.Namespace, is_part: bool) -> StudyResult:
         raise UsageError(error) from error
 
 
+def _usual_folder(name: str) -> Path:
+    """Return the folder of a study that no option names, which must be no link: nobody has named what it leads to."""
+    folder = OwnFolder(Path("studies")) / name
+    folder.check()
+    return folder.path
+
+
 def _factors(words: list[str]) -> dict[str, Any]:
     factors = {}
     for word in words:
@@ -142,14 +151,14 @@ def _factors(words: list[str]) -> dict[str, Any]:
         except ValueError as error:
             raise UsageError(f"--factor: {error}") from error
         if name in factors:
-            raise UsageError(f"--factor: {name} is given twice")
+            raise UsageError(f"--factor {name} is given twice; give all values in one")
         factors[name] = values
     return factors
 
 
 def _range(options: argparse.Namespace) -> range:
     if options.first is None or options.count is None:
-        raise UsageError("--first and --count belong together")
+        raise UsageError("--first without --count, or --count without --first; give both")
     return range(options.first, options.first + options.count)
 
 

@@ -140,8 +140,6 @@ def smooth_frfs(
     True
     """
     freq, lines = checked_frfs(freq_hz, h)
-    if freq.size == 0:
-        raise ValueError("h has no frequency lines")
     spread = None if variance is None else as_real("variance", variance, lines.shape)
     if spread is not None and not (spread > 0).all():
         raise ValueError("variance must be positive")
@@ -198,8 +196,11 @@ def joined(places: Sequence[NDArray[np.intp]], parts: Iterable[SmoothFrfs], shap
 
 
 def checked_frfs(freq_hz: ArrayLike, h: ArrayLike) -> tuple[FloatArray, ComplexArray]:
-    """Return lines, all different, and finite FRFs."""
+    """Return lines, all different, and finite FRFs, at least one."""
     lines = as_lines("h", h)
+    if not lines.size:
+        shape = " x ".join(map(str, lines.shape))
+        raise ValueError(f"h has no FRFs, its shape is {shape}: give at least one frequency line, output and input")
     freq = as_frequency(freq_hz, len(lines))
     check_finite_lines("h", lines, freq)
     order = np.argsort(freq)

@@ -8,7 +8,7 @@ import zipfile
 import zlib
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,8 @@ from jointfrf.io.named_arrays import arrays_of_fields, fields_of
 __all__ = ["NPZ", "npz_fields", "write_npz"]
 
 
-def npz_fields(path: Path, limit: ReadLimit) -> dict[str, NDArray[Any]]:
-    """Read all arrays of an NPZ file.
+def npz_fields(path: Path, limit: ReadLimit, file: BinaryIO | None = None) -> dict[str, NDArray[Any]]:
+    """Read all arrays of an NPZ file; `file` is the same file if it is open.
 
     Raises
     ------
@@ -32,7 +32,7 @@ def npz_fields(path: Path, limit: ReadLimit) -> dict[str, NDArray[Any]]:
     """
     with (
         damage_named(path, "an NPZ file", zipfile.BadZipFile, zlib.error, tokenize.TokenError),
-        zipfile.ZipFile(path) as archive,
+        zipfile.ZipFile(file or path) as archive,
     ):
         return {
             info.filename.removesuffix(".npy"): _array(archive, info, path, limit)

@@ -148,12 +148,12 @@ def lines_of(name: str, array: ArrayLike, *, is_result: bool = False) -> Lines:
     """
     package = type(array).__module__.partition(".")[0]
     if is_result and package not in ("zarr", "h5py") and not isinstance(array, np.ndarray):
-        raise TypeError(f"{name} must be an array that results are written into, not {type(array).__name__}")
+        raise TypeError(f"{name} is a {type(array).__name__}; give an array that results can be written into")
     found = _zarr(array) if package == "zarr" else _hdf5(array, is_result) if package == "h5py" else _numpy(name, array)
     if isinstance(array, np.ndarray) and is_result and not array.flags.writeable:
-        raise ValueError(f"{name} cannot be written: it is open for reading only")
+        raise ValueError(f"{name} is open for reading only; open it for writing")
     if not found.shape:
-        raise ValueError(f"{name} must have an axis of lines, not the shape ()")
+        raise ValueError(f"{name} has no axis of lines, its shape is (); give an array of lines")
     return found
 
 

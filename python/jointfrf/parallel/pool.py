@@ -67,8 +67,8 @@ def check_processes() -> None:
     """Raise a ValueError where no other Python can be started."""
     if not can_start_processes():
         raise ValueError(
-            f"no other process can be started: {sys.executable!r} is not the Python that runs here, or does not take "
-            f"{_SAFE}; say jobs=1, give an executor of threads, or name a Python by multiprocessing.set_executable"
+            f"no process can be started: {sys.executable!r} is not this Python, or ignores {_SAFE}; set jobs=1, give "
+            "an executor of threads, or call multiprocessing.set_executable"
         )
 
 
@@ -377,8 +377,7 @@ class Pool(Generic[_T]):
         self._lost += 1
         if self.make is None or self._lost > _MADE_AGAIN:
             raise BrokenPoolError(
-                "the workers of the executor have ended unexpectedly; what they had finished is kept: the same call "
-                "continues with it"
+                "the workers of the executor have ended unexpectedly; finished tasks are kept: make the same call again"
             ) from error
         self.executor.shutdown(wait=False)
         self.executor = self.make()
@@ -408,7 +407,7 @@ def opened_pool(executor: AnyExecutor | None = None, jobs: int | None = None) ->
         yield Pool(executor, jobs or _workers_of(executor))
         return
     if executor is not None and not callable(executor):
-        raise TypeError(f"executor must be one of concurrent.futures, or make one, not {type(executor).__name__}")
+        raise TypeError(f"executor is a {type(executor).__name__}; give one of concurrent.futures, or what makes one")
     make: Callable[[], Executor]
     if executor is not None:
         make = executor
@@ -418,7 +417,7 @@ def opened_pool(executor: AnyExecutor | None = None, jobs: int | None = None) ->
         make = _InThisThread
     own = make()
     if not callable(getattr(own, "submit", None)):
-        raise TypeError(f"executor must make one of concurrent.futures, not {type(own).__name__}")
+        raise TypeError(f"executor returned a {type(own).__name__}; let it return an executor of concurrent.futures")
     pool: Pool[Any] = Pool(own, jobs or _workers_of(own), None if isinstance(own, _InThisThread) else make)
     try:
         yield pool

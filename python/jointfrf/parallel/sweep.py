@@ -242,13 +242,13 @@ def _checked(operation: LineFunction, arrays: Mapping[str, ArrayLike], out: Any)
     result = lines_of("out", out, is_result=True)
     for name, own in inputs.items():
         if own.shape[0] != result.shape[0]:
-            raise ValueError(f"{name} has {own.shape[0]} lines and out {result.shape[0]}")
+            raise ValueError(f"{name} has {own.shape[0]} lines and out {result.shape[0]}; give both the same number")
         same = own.place is not None and own.place == result.place
         if same or (isinstance(arrays[name], np.ndarray) and isinstance(out, np.ndarray)
                     and np.may_share_memory(arrays[name], out)):  # fmt: skip
-            raise ValueError(f"out must not lie where {name} lies: a task that is done again would read its own result")
+            raise ValueError(f"out shares its memory or file with {name}; give out one of its own")
     if not inputs or not result.shape[0]:
-        raise ValueError("arrays must hold at least one array, with at least one line")
+        raise ValueError("arrays contains no lines; give at least one array with at least one line")
     return _Sweep(operation, inputs, result)
 
 
@@ -333,7 +333,9 @@ def sweep(
         with opened_pool(executor, jobs) as pool:
             used = plan or _measured(whole, pool)
             if used.n_lines != whole.n_lines:
-                raise ValueError(f"plan is of {used.n_lines} lines, not of {whole.n_lines}")
+                raise ValueError(
+                    f"plan is of {used.n_lines} lines, arrays have {whole.n_lines}; plan with these arrays"
+                )
             for task, result in pool.completed(_do, _tasks(whole, used, first)):
                 if result.values is not None:
                     whole.out.write(task.lines, result.values)
@@ -344,8 +346,7 @@ def sweep(
                     progress(finished.count, whole.n_lines)
     except BrokenPoolError as error:
         raise BrokenPoolError(
-            f"the workers of the executor have ended unexpectedly; {finished}: sweep(..., first={finished.end}) "
-            "computes the rest"
+            f"the workers of the executor have ended unexpectedly; {finished}: call sweep(..., first={finished.end})"
         ) from error
     if poor:
         start, text = min(poor)

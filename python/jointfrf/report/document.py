@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -231,8 +233,10 @@ def make_document(document: Document) -> str:
     if any(isinstance(part, Space) for part in parts):
         script += import_extra("plotly.offline").get_plotlyjs() + ";\n"
         script += (_FOLDER / "space.js").read_text(encoding="utf-8")
+    script = script.replace("\r\n", "\n").replace("\r", "\n")  # as a browser reads it, whose checksum must be the same
     return environment.get_template("page.html.jinja").render(
         document=document,
+        policy=_policy(script),
         version=version("jointfrf"),
         verdict=VERDICT,
         style=Markup(_style(parts, charts)),
@@ -247,6 +251,16 @@ def make_document(document: Document) -> str:
             }
             for section in document.sections
         ],
+    )
+
+
+def _policy(script: str) -> str:
+    """Return what a browser lets the page do: show itself and run this script; nothing is loaded, nothing is sent."""
+    checksum = b64encode(sha256(script.encode("utf-8")).digest()).decode("ascii")
+    allowed = f"'sha256-{checksum}'" if script else "'none'"
+    return (
+        f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
+        "form-action 'none'"
     )
 
 

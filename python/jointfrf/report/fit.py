@@ -15,7 +15,7 @@ from scipy.special import ndtri
 
 from jointfrf.dofs import Parameter, ParameterKind, compliance_unit, parameter_name
 from jointfrf.errors import IllConditionedWarning
-from jointfrf.files import below, write_file
+from jointfrf.files import OwnFolder, clean_name
 from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.record import fit_to_dict
 from jointfrf.identification.result import Fit, FittedParameter
@@ -223,11 +223,8 @@ def write_fit(fits: Sequence[Fit], folder: Path, source: str, figures: Sequence[
             contents[f"{stem}.png"], contents[f"{stem}.svg"] = draw(figure)
     for figure in figures:
         contents[f"{figure.key}.png"], contents[f"{figure.key}.svg"] = draw(figure)
-    folder.mkdir(parents=True, exist_ok=True)
-    written = {below(folder, file): content for file, content in contents.items()}
-    for path, content in written.items():
-        write_file(path, content)
-    return list(written)
+    own = OwnFolder(folder).make()
+    return [own.write(clean_name(name), content) for name, content in contents.items()]
 
 
 #: Parts of the band over which shares are summed, and lines a part at least.

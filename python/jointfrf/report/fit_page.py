@@ -149,8 +149,8 @@ def fit_document(fit: Fit, options: ReportOptions) -> Document:
     data = fit.data
     if data is None:
         raise ValueError(
-            "a report shows the measured FRFs, and this fit holds none, as fits that were loaded, means over bands and "
-            "those of many realisations: call identify with the FRFs and method 'compliance', and report that"
+            "this fit contains no measured FRFs for a report; call identify with the FRFs and method 'compliance', and "
+            "report its fit"
         )
     sections = _joint_sections(fit, data, options) if isinstance(data, FitData) else _model_sections(fit, options)
     title = f"Joint identified from {options.source}" if options.source else "Joint identified from FRFs"

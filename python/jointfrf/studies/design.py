@@ -19,7 +19,7 @@ from jointfrf.cases.keys import Case, StudyKeys
 from jointfrf.cases.kind import CaseKind, Estimator, Pollution, StudyChoice
 from jointfrf.errors import FileContentError
 from jointfrf.kernel.arguments import as_names, check_choice, check_type, one_line
-from jointfrf.spelling import did_you_mean
+from jointfrf.spelling import did_you_mean, some_of
 from jointfrf.toml.declared import read_keys
 from jointfrf.toml.table import TomlTable, read_toml
 
@@ -163,22 +163,22 @@ class StudyDesign:
 def _values_of(name: str, values: Any) -> list[FactorValue]:
     """Return the values of a factor as a case file has them."""
     if isinstance(values, str | bytes) or not isinstance(values, Iterable):
-        raise TypeError(f"factor {name!r} must have a list of values, not {one_line(values)}")
+        raise TypeError(f"factor {name!r} is {one_line(values)}; give a list of values")
     found = [value.item() if isinstance(value, np.generic) else value for value in values]
     if not found:
-        raise ValueError(f"factor {name!r} must have a list of values, not an empty one")
+        raise ValueError(f"factor {name!r} has no values; give at least one")
     for value in found:
         if not isinstance(value, FactorValue):
-            raise TypeError(f"factor {name!r} takes numbers and words, not {one_line(value)}")
+            raise TypeError(f"factor {name!r} has the value {one_line(value)}; give numbers or words")
     if len({repr(value) for value in found}) < len(found):
-        raise ValueError(f"factor {name!r} has a value twice: {', '.join(map(str, found))}")
+        raise ValueError(f"factor {name!r} has a value twice: {some_of(found, 12)}; give each value once")
     return found
 
 
 def _check_functions(name: str, functions: Mapping[str, object]) -> None:
     for key, each in functions.items():
         if not callable(each):
-            raise TypeError(f"{name}: {key!r} must be a function, not {type(each).__name__}")
+            raise TypeError(f"{name}: {key!r} is {one_line(each)}; give a function")
 
 
 def in_words(point: StudyPoint) -> str:
@@ -205,7 +205,7 @@ def parse_factor(word: str) -> tuple[str, list[FactorValue]]:
     """
     name, equals, values = word.partition("=")
     if not equals or not name.strip() or not values.strip():
-        raise ValueError(f"a factor is NAME=VALUE,VALUE,..., not {word!r}")
+        raise ValueError(f"{word!r} is no factor; write NAME=VALUE,VALUE,...")
     return name.strip(), [_value(one.strip()) for one in values.split(",")]
 
 
@@ -229,7 +229,7 @@ def _changed(content: dict[str, Any], point: StudyPoint, where: str, are_noises_
         number = _spacing_of(changed, value, where) if name == "lines" else value
         if not sum(_set(changed, key, number, where) for key in keys):
             hint = did_you_mean(name, _NAMED)
-            raise FileContentError(f"{where}: the case has no key for the factor {name!r}{hint}")
+            raise FileContentError(f"{where}: unknown factor {name!r}{hint or '; name a key of the case'}")
         if is_level:  # its name in the file says another level
             changed["noise"][0]["name"] = str(changed["noise"][0].get("kind", "noise"))
     return changed
@@ -239,18 +239,18 @@ def _spacing_of(content: dict[str, Any], lines: FactorValue, where: str) -> floa
     """Return the spacing at which so many lines lie between the first and the last."""
     frequency = content.get("frequency", {})
     if not isinstance(lines, int) or lines < 2:
-        raise FileContentError(f"{where}: lines must be whole numbers, at least 2, not {lines!r}")
+        raise FileContentError(f"{where}: lines is {one_line(lines)}; give a whole number, at least 2")
     try:
         return float((frequency["last"] - frequency["first"]) / (lines - 1))
     except (KeyError, TypeError) as error:
-        raise FileContentError(f"{where}: lines need [frequency] with numbers first and last") from error
+        raise FileContentError(f"{where}: [frequency] has no first and last for the factor lines; set both") from error
 
 
 def _set(content: dict[str, Any], key: str, value: FactorValue, where: str) -> int:
     """Set a key wherever its tables are, and return in how many."""
     steps = _STEP.findall(key.removesuffix("*"))
     if ".".join(name + at for name, at in steps) != key.removesuffix("*"):
-        raise FileContentError(f"{where}: {key!r} is not a key such as joint.stiffness or joint[0].stiffness")
+        raise FileContentError(f"{where}: {key!r} is no key; write one such as joint.stiffness or joint[0].stiffness")
     tables: list[Any] = [content]
     for name, at in steps[:-1]:
         inner = [table[name] for table in tables if isinstance(table, dict) and name in table]
@@ -273,7 +273,9 @@ def _scaled(table: dict[str, Any], name: str, value: FactorValue, where: str) ->
     if name not in table:
         return False
     if isinstance(value, str | bool) or not isinstance(table[name], int | float):
-        raise FileContentError(f"{where}: {name} = {table[name]!r} cannot be multiplied by {value!r}")
+        raise FileContentError(
+            f"{where}: {name} = {one_line(table[name])} cannot be multiplied by {one_line(value)}; leave out the *"
+        )
     table[name] = table[name] * value
     return True
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, Literal, NamedTuple
 
 import numpy as np
 from numpy.lib.format import write_array_header_1_0
@@ -17,8 +18,8 @@ from numpy.typing import NDArray
 from jointfrf.cases.catalogue import write_results
 from jointfrf.cases.kind import Estimates
 from jointfrf.extras import check_extras, import_extra
-from jointfrf.files import written_whole
-from jointfrf.kernel.arguments import FloatArray, as_integer
+from jointfrf.files import OwnFolder, written_whole
+from jointfrf.kernel.arguments import FloatArray, as_integer, check_choice
 from jointfrf.report.document import Document, Listing, Picture, Section
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Figure
@@ -55,16 +56,16 @@ class StudyResult:
         """Point of the design, noise and columns of each group of estimates."""
         return self.record.groups
 
-    @property
+    @cached_property
     def missing(self) -> int:
         """How many realisations of groups have not been computed."""
         wanted = Span(0, self.record.realisations)
-        return sum(span.count for own in self._store.missing(len(self.groups), wanted) for span in own)
+        return sum(span.count for own in self._store.missing(self.record, wanted) for span in own)
 
     @cached_property
     def summary(self) -> list[ParameterSummary]:
         """Each parameter by each estimator at each point of the design."""
-        return summarise(self._store)
+        return summarise(self._store, self.record)
 
     def estimates(self, group: int) -> tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
         """Return the single realisations of a group.
@@ -90,7 +91,7 @@ class StudyResult:
             raise ValueError(f"group must be from 0 to {len(self.groups) - 1}, not {group}")
         columns = len(self.groups[group].columns)
         numbers, parts = [np.empty(0, np.int64)], [np.empty((3, 0, columns))]
-        for first, estimates in self._store.chunks(group):
+        for first, estimates in self._store.chunks(self.record, group):
             numbers.append(np.arange(first, first + len(estimates.values)))
             parts.append(np.array(estimates))
         values, low, high = np.concatenate(parts, axis=1)
@@ -133,7 +134,7 @@ class StudyResult:
         MissingPackageError
             matplotlib or jinja2 is not installed.
         """
-        return _write_report(self.folder, self.record, self.table, self.figures, self.to_dict())
+        return _write_report(self._store.own, self.record, self.table, self.figures, self.to_dict())
 
     def save_parquet(self, path: str | Path) -> Path:
         """Write single realisations as a Parquet file, a row for each estimate; memory does not depend on their number.
@@ -151,7 +152,8 @@ class StudyResult:
         MissingPackageError
             pyarrow is not installed.
         """
-        return _write_parquet(self._store, self.record, Path(path))
+        _write_parquet(self._store, self.record, written_whole(Path(path)))
+        return Path(path)
 
     def save_npz(self, path: str | Path) -> Path:
         """Write single realisations as an NPZ file; memory does not depend on their number.
@@ -166,7 +168,33 @@ class StudyResult:
         -------
         Path
         """
-        return _write_npz(self._store, self.record, Path(path))
+        _write_npz(self._store, self.record, written_whole(Path(path)))
+        return Path(path)
+
+    def save_values(self, form: Literal["parquet", "npz"]) -> Path:
+        """Write single realisations into the folder of the study, as `save_parquet` or `save_npz` do.
+
+        Parameters
+        ----------
+        form : {"parquet", "npz"}
+
+        Returns
+        -------
+        Path
+            `realisations.parquet` or `realisations.npz`.
+
+        Raises
+        ------
+        FileContentError
+            A link, a pipe or a device is in its place.
+        MissingPackageError
+            pyarrow is not installed.
+        """
+        check_choice("form", form, ("parquet", "npz"))
+        name = f"realisations.{form}"
+        write = _write_parquet if form == "parquet" else _write_npz
+        write(self._store, self.record, self._store.own.written(name))
+        return self.folder / name
 
     def __str__(self) -> str:
         """Return the summary as text."""
@@ -194,7 +222,7 @@ def read_study(folder: str | Path) -> StudyResult:
 
 
 def _write_report(
-    folder: Path, record: StudyRecord, table: Table, figures: Sequence[Figure], content: Mapping[str, Any]
+    folder: OwnFolder, record: StudyRecord, table: Table, figures: Sequence[Figure], content: Mapping[str, Any]
 ) -> Path:
     """Write the page of a study and, beside it, its numbers, table and figures."""
     check_extras("matplotlib", "jinja2")
@@ -219,7 +247,7 @@ def _about(record: StudyRecord) -> str:
     )
 
 
-def _write_parquet(store: StudyStore, record: StudyRecord, path: Path) -> Path:
+def _write_parquet(store: StudyStore, record: StudyRecord, target: AbstractContextManager[Path | BinaryIO]) -> None:
     """Write a row for each realisation and column, a chunk at a time."""
     pa, parquet = import_extra("pyarrow"), import_extra("pyarrow.parquet")
     factors = list(dict.fromkeys(name for group in record.groups for name in group.point))
@@ -227,15 +255,14 @@ def _write_parquet(store: StudyStore, record: StudyRecord, path: Path) -> Path:
     words = {name: pa.dictionary(pa.int32(), pa.string()) for name in ("noise", "estimator", "parameter", "unit")}
     numbers = dict.fromkeys(("actual", "value", "low", "high"), pa.float64())
     schema = pa.schema({**kinds, **words, "realisation": pa.int64(), **numbers})
-    with written_whole(path) as temporary, parquet.ParquetWriter(temporary, schema) as writer:
+    with target as place, parquet.ParquetWriter(place, schema) as writer:
         for number, group in enumerate(record.groups):
-            for first, estimates in store.chunks(number):
+            for first, estimates in store.chunks(record, number):
                 columns = _tidy(group, first, estimates)
                 content = {name: [_as_kind(group.point.get(name), kinds[name], pa)] * len(columns["value"])
                            for name in factors} | columns  # fmt: skip
                 arrays = [pa.array(content[one.name], type=one.type) for one in schema]
                 writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
-    return path
 
 
 def _kind_of(values: Sequence[Any], pa: Any) -> Any:
@@ -275,25 +302,24 @@ class _Member(NamedTuple):
     part: Callable[[int, Estimates], NDArray[Any]]
 
 
-def _write_npz(store: StudyStore, record: StudyRecord, path: Path) -> Path:
+def _write_npz(store: StudyStore, record: StudyRecord, target: AbstractContextManager[Path | BinaryIO]) -> None:
     """Write the realisations of each group as arrays, a chunk at a time."""
     groups = [
         {"point": dict(group.point), "noise": group.noise, "in_words": in_words(group.point),
          "columns": [[column.estimator, column.parameter, column.unit] for column in group.columns]}
         for group in record.groups
     ]  # fmt: skip
-    with written_whole(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
+    with target as place, zipfile.ZipFile(place, "w") as archive:
         with archive.open("groups.npy", "w") as file:
             np.lib.format.write_array(file, np.array(json.dumps(groups)))
         for number, group in enumerate(record.groups):
-            rows = sum(len(estimates.values) for _, estimates in store.chunks(number))
+            rows = sum(len(estimates.values) for _, estimates in store.chunks(record, number))
             for member in _members(number, rows, len(group.columns)):
                 with archive.open(member.name, "w", force_zip64=True) as file:
                     header = {"descr": member.dtype.str, "fortran_order": False, "shape": member.shape}
                     write_array_header_1_0(file, header)
-                    for part in _parts(member, store.chunks(number)):
+                    for part in _parts(member, store.chunks(record, number)):
                         file.write(part.tobytes())
-    return path
 
 
 def _members(number: int, rows: int, columns: int) -> Iterator[_Member]:

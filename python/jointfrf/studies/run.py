@@ -17,7 +17,7 @@ from jointfrf.kernel.arguments import as_integer, check_type, one_line
 from jointfrf.parallel.pool import AnyExecutor, Pool, check_progress, one_thread, opened_pool
 from jointfrf.studies.design import StudyDesign, in_words
 from jointfrf.studies.result import StudyResult
-from jointfrf.studies.store import GroupRecord, Span, StudyRecord, StudyStore
+from jointfrf.studies.store import GroupRecord, Span, StudyRecord, StudyStore, check_estimates
 
 __all__ = ["Chunk", "ChunkResult", "Schedule", "compute_chunk", "merge_studies", "study"]
 
@@ -218,14 +218,15 @@ def study(
     if held is None:
         groups, record = _prepared(folder, plan, realisations)
     else:
-        count = held.realisations if realisations is None else _count(realisations)
-        record = replace(held, realisations=max(count, held.realisations))
+        record = held if realisations is None else replace(held, realisations=_count(realisations))
     wanted = _wanted(part, record.realisations)
-    if held is None or held.realisations < record.realisations:
+    missing = store.missing(record, wanted)
+    if held is not None and any(missing):
+        groups, ours = _prepared(folder, plan, realisations)
+        _check_layout(store, record, ours)
+    if record != held:
         store.begin(record)
-    missing = store.missing(len(record.groups), wanted)
     if any(missing):
-        groups = groups or _prepared(folder, plan, realisations)[0]
         with opened_pool(executor, jobs) as pool:
             _compute(store, Schedule(groups, missing, pool.workers), pool, progress or silent)
     return StudyResult(store.folder)
@@ -234,9 +235,34 @@ def study(
 def _compute(store: StudyStore, schedule: Schedule, pool: Pool, progress: Callable[[int, int], None]) -> None:
     """Compute what is missing, and keep each chunk as it comes."""
     for chunk, result in pool.completed(compute_chunk, iter(schedule)):
+        _check_result(chunk, result, schedule.groups[chunk.group])
         store.write(chunk.group, chunk.first, result.estimates)
         schedule.learn(chunk, result.seconds)
         progress(*schedule.done)
+
+
+def _check_result(chunk: Chunk, result: object, group: EstimateGroup) -> None:
+    """Check what a worker has sent: it may have another version of jointfrf, or run an estimator of the user."""
+    numbers = f"realisations {chunk.first} to {chunk.first + chunk.count - 1} of noise {group.noise!r}"
+    if (
+        not isinstance(result, ChunkResult)
+        or not isinstance(result.estimates, Estimates)
+        or not isinstance(result.seconds, float)
+    ):
+        raise TypeError(
+            f"a worker returned {one_line(result)} for {numbers}: start workers with this version of jointfrf"
+        )
+    try:
+        check_estimates(result.estimates, chunk.count, len(group.columns))
+    except ValueError as error:
+        raise ValueError(f"{numbers}, {group.columns[0].estimator}: {error}") from error
+
+
+def _check_layout(store: StudyStore, held: StudyRecord, ours: StudyRecord) -> None:
+    if held.layout != ours.layout:
+        raise FileContentError(
+            f"{store.folder} was written by another version of jointfrf, with other estimates: name another folder"
+        )
 
 
 def _prepared(folder: Path, design: StudyDesign, realisations: int | None) -> tuple[list[EstimateGroup], StudyRecord]:
@@ -246,7 +272,7 @@ def _prepared(folder: Path, design: StudyDesign, realisations: int | None) -> tu
     seen = None
     for point, case, kind in design.cases(folder):
         if kind.groups is None:
-            raise ValueError(f"cases of kind {kind.name} cannot be studied")
+            raise ValueError(f"a case of kind {kind.name} has no study; use a case of another kind")
         try:
             own = kind.groups(case, design.choice)
         except ValueError as error:
@@ -272,8 +298,7 @@ def _wanted(part: range | None, realisations: int) -> Span:
     check_type("part", part, range)
     if part.step != 1 or not len(part) or part.start < 0 or part.stop > realisations:
         raise ValueError(
-            f"a part must be realisations in a row, at least one, from 0 to {realisations - 1}, not {part.start} to "
-            f"{part.stop - 1}"
+            f"part is {one_line(part)}; give at least one realisation, in steps of 1, within range({realisations})"
         )
     return Span(part.start, len(part))
 
@@ -312,15 +337,16 @@ def merge_studies(parts: Sequence[str | Path], out: str | Path) -> StudyResult:
     0
     """
     if isinstance(parts, str | Path) or not isinstance(parts, Iterable):
-        raise TypeError(f"parts must be a list of folders, not {one_line(parts)}")
+        raise TypeError(f"parts is {one_line(parts)}; give a list of folders")
     stores, target = [StudyStore(Path(part)) for part in parts], StudyStore(Path(out))
     if not stores:
-        raise ValueError("no part of a study was named")
+        raise ValueError("parts is empty; name at least one folder")
     first = stores[0].read()
     known = [target] if target.exists else []
     records = [one.check(first.identity) for one in (*stores, *known)]
-    if any(len(one.groups) != len(first.groups) for one in records):
-        raise FileContentError(f"{out}: the parts were computed by different versions of jointfrf")
-    target.begin(replace(first, realisations=max(one.realisations for one in records)))
-    target.take(stores)
+    for store, one in zip((*stores, *known), records, strict=True):
+        _check_layout(store, one, first)
+    whole = replace(first, realisations=max(one.realisations for one in records))
+    target.begin(whole)
+    target.take(whole, stores)
     return StudyResult(target.folder)

@@ -102,10 +102,11 @@ class _Sums:
         self.inside += (has_interval & (low <= self.actual) & (self.actual <= high)).sum(axis=0)
 
 
-def sample_of(store: StudyStore, group: int, columns: int) -> FloatArray:
+def sample_of(store: StudyStore, record: StudyRecord, group: int) -> FloatArray:
     """Return values of a group, shape (r, n_columns): all of them, or the first ones of very many."""
-    most, rows = max(1, _SAMPLE // max(columns, 1)), [np.empty((0, columns))]
-    for _, estimates in store.chunks(group):
+    columns = len(record.groups[group].columns)
+    most, rows = max(1, _SAMPLE // columns), [np.empty((0, columns))]
+    for _, estimates in store.chunks(record, group):
         rows.append(estimates.values[:most])
         most -= len(rows[-1])
         if most <= 0:
@@ -113,12 +114,14 @@ def sample_of(store: StudyStore, group: int, columns: int) -> FloatArray:
     return np.concatenate(rows)
 
 
-def summarise(store: StudyStore) -> list[ParameterSummary]:
+def summarise(store: StudyStore, record: StudyRecord) -> list[ParameterSummary]:
     """Condense a study, a group at a time.
 
     Parameters
     ----------
     store : StudyStore
+    record : StudyRecord
+        What the store holds.
 
     Returns
     -------
@@ -126,11 +129,11 @@ def summarise(store: StudyStore) -> list[ParameterSummary]:
         In the order of the design. Percentiles are those of the first 4e6 numbers of a group, all else of all.
     """
     found = []
-    for number, group in enumerate(store.read().groups):
+    for number, group in enumerate(record.groups):
         sums = _Sums(np.array([column.actual for column in group.columns]))
-        for _, estimates in store.chunks(number):
+        for _, estimates in store.chunks(record, number):
             sums.add(*estimates)
-        sample = sample_of(store, number, len(group.columns))
+        sample = sample_of(store, record, number)
         for c, column in enumerate(group.columns):
             good, intervals = int(sums.good[c]), int(sums.intervals[c])
             values = sample[np.isfinite(sample[:, c]), c]

@@ -27,7 +27,7 @@ CHANGES = [
     (
         "level = 0.05",
         "level = 5",
-        r"\[\[noise\]\] number 1: level: 5 is noise of 500 % .*; if that is meant, say confirm_level = true$",
+        r"\[\[noise\]\] number 1: level: 5 is noise of 500 % .*; correct it, or set confirm_level = true$",
     ),
     ("level = 0.05", "level = 0.51\nconfirm_level = false", r"level: 0\.51 is noise of 51 %"),
     ("level = 0.05", "level = 0.51\nconfirm_level = 1", r"confirm_level must be true or false, not 1"),
@@ -71,8 +71,7 @@ CHANGES = [
     (
         'motion = "translation"',
         'motion = "rotation"',
-        r"\[\[joint\]\] number 1: motion must be 'translation', which is what the name 'x' of the DOF says \(name a "
-        r"rotation like theta, .*\), not 'rotation'",
+        r"\[\[joint\]\] number 1: motion must be 'translation', as the name 'x' states, not 'rotation'",
     ),
     ("damping = 3.0", "damping = -3.0", r"damping must be a number, at least 0, not -3.0"),
     ('model = "chain"', 'model = "plate"', r"model must be one of chain, beam, brick-beam, .*, not 'plate'"),

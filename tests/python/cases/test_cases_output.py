@@ -263,7 +263,7 @@ def test_version(capsys):
 def test_unknown_case_is_one_sentence_and_status_2(capsys):
     assert main(["run", "9.9"]) == 2
     error = capsys.readouterr().err
-    assert error.startswith("jointfrf: error: there is no case '9.9'; known cases: 3.1-discrete")
+    assert error.startswith("jointfrf: error: unknown case '9.9'; name a folder with a case.toml, or one of the")
     assert error.count("\n") == 1
 
 
@@ -291,7 +291,7 @@ def test_two_cases_of_one_name_are_refused(tmp_path, capsys):
     own.mkdir()
     (own / "case.toml").write_text((find_case("3.1") / "case.toml").read_text())
     assert main(["run", "3.1", str(own)]) == 2
-    assert "overwrite" in capsys.readouterr().err
+    assert "run each with its own --out" in capsys.readouterr().err
 
 
 def test_command_survives_a_closed_pipe():

@@ -148,7 +148,11 @@ def test_a_bad_npz_file(by_matrices, write, message):
         ),
         ("loss_factor = 0.01", "loss_factor = -1", r"loss_factor must be a number, at least 0, not -1$"),
         ("stiffness = ", "stifness = ", r"unknown key 'stifness'; it takes model, .*; did you mean 'stiffness'\?$"),
-        ('j = ["3:y", "3:theta"]', 'j = ["3:y", "3:y"]', r"\[points\]: the joint DOF '3:y' is named twice$"),
+        (
+            'j = ["3:y", "3:theta"]',
+            'j = ["3:y", "3:y"]',
+            r"\[points\]: the joint DOF '3:y' is named twice; name each",
+        ),
         ('j = ["3:y", "3:theta"]', 'j = ["3:y", "4:y"]', r"\[points\]: the model has no DOF '4:y'"),
     ],
 )
@@ -186,7 +190,11 @@ def test_a_bad_file_of_dofs(by_matrices, text, message):
             r"quantity must be one of receptance, mobility, ",
         ),
         ('k = ["1:y", "1:rz"]', 'k = ["1:y", "1:theta"]', r"\[points\]: '1:theta' is no channel: expected a node"),
-        ('k = ["1:y", "1:rz"]', 'k = ["1:y", "1:-y"]', r"\[points\]: the joint DOF '1:y' is named twice$"),
+        (
+            'k = ["1:y", "1:rz"]',
+            'k = ["1:y", "1:-y"]',
+            r"\[points\]: the joint DOF '1:y' is named twice; name each",
+        ),
         ('k = ["1:y", "1:rz"]', 'k = ["1:y", "9:rz"]', r"\[points\]: \S+b\.uff: missing FRFs .*9:\+rz / 1:\+y"),
         ("step = 5.0", "step = 2.5", r"\[substructure_a\]: file: \S+a\.uff has no line at 17\.5 Hz, the nearest is "),
         ("last = 900.0", "last = 905.0", r"a\.uff has no line at 905 Hz, the nearest is 900 Hz \(1 of 179 lines are"),
@@ -234,7 +242,7 @@ def test_a_sensor_that_shows_nothing(by_receptances):
     h = frfs.h.copy()
     h[:, 1] = 0
     write_uff(by_receptances / "b.uff", FrfSet(frfs.freq_hz, frfs.responses, frfs.excitations, h))
-    check(by_receptances, r"\[points\]: \S+b\.uff: the FRF 1:\+rz / 1:\+rz is zero on all lines$")
+    check(by_receptances, r"\[points\]: \S+b\.uff: the FRF 1:\+rz / 1:\+rz is zero on all lines; check it$")
 
 
 def test_what_needs_a_model_is_told(by_receptances):

@@ -2,8 +2,10 @@
 
 import re
 import zlib
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from itertools import pairwise
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -188,6 +190,57 @@ def test_headings_alternatives_and_names_are_there(browser, pages):
     assert len(ids) == len(set(ids))
     for target in page.eval_on_selector_all("nav a", "all => all.map(a => a.getAttribute('href').slice(1))"):
         assert target in ids
+
+
+#: What a stranger's text would do if it came into a page as markup: load, send, run, and lead links elsewhere.
+_SMUGGLED = """<script>document.title = "owned"</script><script src="{0}/a.js"></script>
+<img src="{0}/a.png" onerror="document.title = 'owned'"><link rel="stylesheet" href="{0}/a.css">
+<iframe src="{0}/frame"></iframe><object data="{0}/object"></object><svg><image href="{0}/b.png"></image></svg>
+<style>@import "{0}/b.css"; body {{background: url({0}/c.png)}} @font-face {{font-family: f; src: url({0}/f.woff)}}
+p {{font-family: f}}</style><video src="{0}/a.mp4"></video><base href="{0}/"><p>text</p>"""
+
+
+class _Listener(BaseHTTPRequestHandler):
+    """Notes what is asked for; answers that there is none."""
+
+    def do_GET(self):
+        self.server.asked.append(self.path)
+        self.send_error(404)
+
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture
+def listener():
+    """A server of this machine."""
+    with ThreadingHTTPServer(("127.0.0.1", 0), _Listener) as server:
+        server.asked = []
+        thread = Thread(target=server.serve_forever)
+        thread.start()
+        yield server
+        server.shutdown()
+        thread.join()
+
+
+@pytest.mark.parametrize("has_policy", [True, False])
+def test_what_is_smuggled_into_a_page_loads_and_runs_nothing(browser, pages, listener, has_policy):
+    """All texts are escaped; if one were not, the policy of the page still let nothing in or out."""
+    address = f"http://127.0.0.1:{listener.server_port}"
+    text = (pages / "fit.html").read_text(encoding="utf-8").replace("</h1>", f"</h1>{_SMUGGLED.format(address)}")
+    if not has_policy:  # the same page shows that these ways lead out
+        text = re.sub('<meta http-equiv="Content-Security-Policy"[^>]*>', "", text)
+    (pages / "smuggled.html").write_text(text, encoding="utf-8")
+    opened = Opened(browser, pages / "smuggled.html")
+    opened.page.evaluate(f"fetch('{address}/fetched', {{mode: 'no-cors'}}).catch(() => null)")
+    opened.page.wait_for_load_state("networkidle")
+    assert (opened.page.title() == "owned") is not has_policy
+    assert opened.page.evaluate("document.baseURI").startswith("file:" if has_policy else address)
+    assert opened.page.locator("#frf-1 .tools").is_visible()  # the own script runs
+    if has_policy:
+        assert listener.asked == []
+    else:
+        assert {"/a.js", "/a.png", "/a.css", "/b.css", "/b.png", "/c.png", "/frame", "/fetched"} <= set(listener.asked)
 
 
 def paths_outside(page):

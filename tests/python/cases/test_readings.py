@@ -214,7 +214,7 @@ def test_command_prints_the_ranking_and_writes_every_reading(tmp_path, capsys):
     [
         (["4.3.3"], "4.3.3-bolt is not a case of a known joint"),
         (["3.3.1"], "names no values of a method with band means"),
-        (["3.9"], "there is no case '3.9'"),
+        (["3.9"], "unknown case '3.9'"),
         (["3.2", "--spacing", "1,0"], "must be positive numbers, separated by commas, not '1,0'"),
         (["3.2", "--level", "x"], "must be positive numbers, separated by commas, not 'x'"),
     ],

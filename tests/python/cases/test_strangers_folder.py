@@ -4,8 +4,11 @@ import csv
 import html
 import io
 import os
+import re
 import subprocess
 import sys
+from base64 import b64encode
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +18,8 @@ import jointfrf as jf
 from command import run_command
 from jointfrf.cases.catalogue import find_case, run_case
 from jointfrf.io.cards import CardFormat
+from jointfrf.report.chart import Chart
+from jointfrf.report.document import Document, Section, Words, make_document
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Curve, Figure, Panel, figure_csv
 from jointfrf.report.table import Table, table_csv
@@ -76,8 +81,29 @@ def test_a_link_in_the_folder_of_results_is_not_followed(tmp_path, monkeypatch):
     (tmp_path / "home").mkdir()
     (tmp_path / "results" / "3.1-discrete").mkdir(parents=True)
     (tmp_path / "results" / "3.1-discrete" / "tables").symlink_to(tmp_path / "home")
-    with pytest.raises(jf.FileContentError, match="is a link out of its folder"):
+    with pytest.raises(jf.FileContentError, match="tables is a link or no folder, not a folder of its own"):
         run_case(find_case("3.1"), realisations=2)
+    assert not list((tmp_path / "home").iterdir())
+
+
+@pytest.mark.parametrize(("kind", "schema"), [("study", "case.schema.json"), ("assembly", "assembly.schema.json")])
+def test_a_new_case_is_written_through_no_link(tmp_path, kind, schema):
+    (tmp_path / "thesis.txt").write_text("of the user")
+    (tmp_path / "new").mkdir()
+    (tmp_path / "new" / schema).symlink_to(tmp_path / "thesis.txt")
+    done = run_command("new", kind, tmp_path / "new")
+    assert done.returncode == 1
+    assert f"{schema} is a link, not a file of its own: remove it" in done.stderr
+    assert (tmp_path / "thesis.txt").read_text() == "of the user"
+    assert [path.name for path in (tmp_path / "new").iterdir()] == [schema]
+
+
+def test_the_folder_of_a_case_is_no_link_out_of_the_results(tmp_path):
+    (tmp_path / "home").mkdir()
+    (tmp_path / "results").mkdir()
+    (tmp_path / "results" / "3.1-discrete").symlink_to(tmp_path / "home")
+    with pytest.raises(jf.FileContentError, match=r"3\.1-discrete is a link or no folder"):
+        run_case(find_case("3.1"), tmp_path / "results", realisations=2)
     assert not list((tmp_path / "home").iterdir())
 
 
@@ -92,6 +118,22 @@ def test_a_page_shows_no_text_of_another_folder(tmp_path, without_pictures):
     page = run_case(case, tmp_path / "results", realisations=2).report.read_text(encoding="utf-8")
     assert "secret of the reader" not in page
     assert "Two masses and two masses" in page
+
+
+@pytest.mark.parametrize("has_chart", [True, False])
+def test_the_policy_of_a_page_allows_its_own_script_only(has_chart):
+    x = np.array([1.0, 2.0])
+    chart = Chart(Figure("key", "caption", (Panel("", "x", "y", (Curve("curve", x, x, "actual"),)),)), "in words")
+    page = make_document(Document("title", "", [Section("s", "S", [chart if has_chart else Words(["text"])])]))
+    (policy,) = re.findall(r'<meta http-equiv="Content-Security-Policy" content="([^"]*)">', page)
+    rules = dict(rule.split(" ", 1) for rule in html.unescape(policy).split("; "))
+    assert page.index("Content-Security-Policy") < page.index("<title>") < page.index("<style>")
+    scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    sums = [b64encode(sha256(script.encode()).digest()).decode() for script in scripts]
+    assert len(sums) == has_chart
+    assert rules.pop("script-src") == (f"'sha256-{sums[0]}'" if has_chart else "'none'")
+    assert rules == {"default-src": "'none'", "style-src": "'unsafe-inline'", "img-src": "data:",
+                     "base-uri": "'none'", "form-action": "'none'"}  # fmt: skip
 
 
 FORMULAS = ("=1+1", "+1+a", "-1+a", "@SUM(A1)", "\t=1", " =1")
@@ -143,6 +185,8 @@ def test_comments_of_cards_stay_comments(program):
 
 _DRAW = """
 import numpy as np
+from jointfrf.report.chart import Chart
+from jointfrf.report.document import Document, Section, Words, make_document
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Curve, Figure, Panel
 x = np.array([1.0, 2.0])

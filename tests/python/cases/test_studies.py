@@ -156,7 +156,8 @@ def test_more_realisations_are_added_to_what_is_there(reference, tmp_path):
     assert more.estimates(1)[0].tolist() == list(range(N + 3))
     np.testing.assert_array_equal(more.estimates(1)[1][:N], reference.estimates(1)[1])
     fewer = jf.study(CASE, tmp_path / "a", 2, design=DESIGN, jobs=1)
-    assert fewer.record.realisations == N + 3
+    assert (fewer.record.realisations, fewer.missing) == (2, 0)
+    assert jf.study(CASE, tmp_path / "a", N + 3, design=DESIGN, jobs=1).estimates(1)[0].tolist() == list(range(N + 3))
 
 
 def test_another_study_does_not_go_into_the_same_folder(reference):
@@ -178,8 +179,54 @@ def test_own_estimators_and_noises(tmp_path):
     for group in (0, 1):
         np.testing.assert_allclose(found.estimates(group)[1][:, 0], expected, rtol=1e-9)
     assert all(np.isnan(row.bound) for row in found.summary)
-    with pytest.raises(ValueError, match="an estimator must return 2 numbers"):
+    with pytest.raises(ValueError, match=r"an estimator returned an array of shape \(1,\); return 2 numbers"):
         jf.study(CASE, tmp_path / "b", 2, design=jf.StudyDesign(estimators={"bad": lambda *_: [1.0]}), jobs=1)
+
+
+class AnotherVersion(ThreadPoolExecutor):
+    """Workers that return something else than ours."""
+
+    def __init__(self, change):
+        super().__init__(1)
+        self.change = change
+
+    def submit(self, fn, /, *args, **kwargs):
+        return super().submit(lambda: self.change(fn(*args, **kwargs)))
+
+
+#: What a worker may return for a result of ours, and what is said of it.
+RETURNED = {
+    "nothing": (lambda result: None, TypeError, "a worker returned None for realisations 0 to"),
+    "a list": (lambda result: list(result), TypeError, "start workers with this version of jointfrf"),
+    "estimates alone": (lambda result: result.estimates, TypeError, "start workers with this version"),
+    "a text as time": (lambda result: result._replace(seconds="2"), TypeError, "start workers with this version"),
+    "lists in estimates": (
+        lambda result: result._replace(estimates=result.estimates._replace(values=[[1.0, 2.0]])),
+        ValueError, "ismm: values must be float64, not list",
+    ),
+    "single precision": (
+        lambda result: result._replace(estimates=result.estimates._replace(low=result.estimates.low.astype("f4"))),
+        ValueError, "ismm: low must be float64, not float32",
+    ),
+    "a row less": (
+        lambda result: result._replace(estimates=type(result.estimates)(*(part[1:] for part in result.estimates))),
+        ValueError, r"of noise '5 %', ismm: values must be \d+ realisations x 2 columns, not \d+ x 2",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", RETURNED)
+def test_what_a_worker_returns_is_checked_before_it_is_kept(tmp_path, kind):
+    change, error, message = RETURNED[kind]
+    with AnotherVersion(change) as executor, pytest.raises(error, match=message):
+        studied(tmp_path, executor=executor)
+    assert not list((tmp_path / "chunks").iterdir())
+
+
+def test_an_estimator_that_gives_infinity_is_named(tmp_path):
+    design = jf.StudyDesign({"lines": [50]}, noises=["5 %"], estimators={"mine": lambda *_: [np.inf, 1.0]})
+    with pytest.raises(ValueError, match="'5 %', mine: values must be finite, or NaN if a realisation failed"):
+        jf.study(CASE, tmp_path, 4, design=design, jobs=1)
 
 
 def test_a_realisation_without_a_joint_counts_as_failed(tmp_path):
@@ -221,7 +268,7 @@ def test_a_modelled_joint(tmp_path):
     rows = {row.parameter: row for row in found.summary}
     assert {"k_y", "alpha_y", "A/youngs_modulus"} <= set(rows)
     assert all(abs(row.bias) < 5 * row.bound for row in rows.values())
-    with pytest.raises(ValueError, match="has the estimator model-fit only"):
+    with pytest.raises(ValueError, match="in a case of kind modelled-joint; use model-fit"):
         jf.study("rubber-mount", tmp_path / "b", 2, design=jf.StudyDesign(estimators=["ismm"]), jobs=1)
 
 
@@ -247,18 +294,22 @@ def test_command_says_what_the_study_holds(reference, tmp_path):
 @pytest.mark.parametrize(
     ("words", "status", "message"),
     [
-        (["3.1", "--factor", "noise"], 2, "--factor: a factor is NAME=VALUE,VALUE,..., not 'noise'"),
+        (["3.1", "--factor", "noise"], 2, "--factor: 'noise' is no factor; write NAME=VALUE,VALUE,..."),
         (["3.1", "--factor", "noise=1%"], 1, "level must be a number, at least 0, not '1%'"),
-        (["3.1", "--factor", "nois=0.1"], 1, "no key for the factor 'nois'; did you mean noise?"),
-        (["3.1", "--first", "3"], 2, "--first and --count belong together"),
-        (["3.1", "--realisations", "5", "--first", "3", "--count", "3"], 1, "from 0 to 4, not 3 to 5"),
+        (["3.1", "--factor", "nois=0.1"], 1, "unknown factor 'nois'; did you mean noise?"),
+        (["3.1", "--first", "3"], 2, "--first without --count, or --count without --first; give both"),
+        (
+            ["3.1", "--realisations", "5", "--first", "3", "--count", "3"],
+            1,
+            "part is range(3, 6); give at least one",
+        ),
         (["3.1", "--realisations", "0"], 1, "realisations must be from 1 to 2147483647, not 0"),
-        (["3.1", "3.2"], 2, "one case at a time, not 3.1 and 3.2"),
-        (["3.11"], 2, "there is no case '3.11'"),
-        (["merge", "somewhere"], 2, "merge needs the folders of parts, and --out DIR"),
+        (["3.1", "3.2"], 2, "several cases, 3.1, 3.2; name one"),
+        (["3.11"], 2, "unknown case '3.11'"),
+        (["merge", "somewhere"], 2, "name the folders of parts, and --out DIR"),
         (["merge", "somewhere", "--out", "there"], 1, "somewhere holds no study"),
-        (["3.1", "--estimator", "compliances"], 1, "no estimator 'compliances'; did you mean compliance?"),
-        (["3.1", "--noise", "6 %"], 1, "the case has no noise '6 %'"),
+        (["3.1", "--estimator", "compliances"], 1, "unknown estimator 'compliances'; did you mean compliance?"),
+        (["3.1", "--noise", "6 %"], 1, "unknown noise '6 %'"),
         (["3.1", "--executor", "dusk"], 2, "must be one of processes, threads, loky, mpi, dask:ADDRESS, not 'dusk'"),
         (["3.1", "--values", "csv"], 2, "must be parquet or npz, not 'csv'"),
     ],

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import jointfrf as jf
-from abi import LISTED, prototypes
+from abi import EXPORTED, prototypes
 from installed_library import CHECKED, COMPILERS, ROOT, InstalledLibrary, install, run
 
 pytestmark = pytest.mark.builds
@@ -87,6 +87,48 @@ def test_static_library(libraries, tmp_path, language, n_bytes):
     assert "libjointfrf" not in run(["readelf", "-d", tmp_path / "program"])
 
 
+@pytest.mark.parametrize(("option", "end"), [("-fno-underscoring", ""), ("-fsecond-underscore", "__")])
+@pytest.mark.parametrize("n_bytes", [4, 8])
+def test_hosts_that_spell_symbols_otherwise(libraries, tmp_path, n_bytes, option, end):
+    """FORTRAN 77 without the module: the compiler makes the symbol of the name."""
+    library = libraries[n_bytes]
+    usual = run([library.compile(TESTS / "f77" / "case.f", tmp_path / "usual", *default_integer(n_bytes, ".f"))])
+    host = library.compile(TESTS / "f77" / "case.f", tmp_path / "host", option, *default_integer(n_bytes, ".f"))
+    wanted = {line.split()[-1].partition("@")[0] for line in run(["nm", "-D", host]).splitlines() if " U jf_" in line}
+    assert len(wanted) > 4
+    assert all(name == name.rstrip("_") + end for name in wanted)
+    assert run([host]) == usual
+    flags = library.pkg_config("--static", "--libs")
+    flags[flags.index(f"-l{library.name}")] = f"-l:lib{library.name}.a"
+    flags += [flag.replace("-L", "-Wl,-rpath,") for flag in flags if flag.startswith("-L")]
+    compiler = [*COMPILERS[".f"], option, *default_integer(n_bytes, ".f"), *library.pkg_config("--cflags")]
+    run([*compiler, "-O2", "-ffp-contract=off", TESTS / "f77" / "case.f", "-o", tmp_path / "static", *flags])
+    assert run([tmp_path / "static"]) == usual
+    assert "libjointfrf" not in run(["readelf", "-d", tmp_path / "static"])
+
+
+@pytest.mark.skipif(shutil.which("patch") is None, reason="needs patch")
+@pytest.mark.parametrize("option", ["", "-fsecond-underscore"])
+def test_a_program_with_a_joint_prints_the_same_with_long_integers(libraries, tmp_path, option):
+    """The plane frames of tests/f77, whose COMMON blocks, work arrays and calls all have the longer integers."""
+    folder = tmp_path / "f77"
+    folder.mkdir()
+    for name in ("frame.f", "frame.inc", "frame.deck", "README.md"):
+        shutil.copy(TESTS / "f77" / name, folder)
+    run(["patch", "-p1", "-i", TESTS / "f77" / "frame-joint.patch"], cwd=folder)
+    cards = [line for line in (folder / "README.md").read_text().splitlines() if line.startswith("JOINT ")]
+    deck = (folder / "frame.deck").read_text().replace("END\n", "\n".join([*cards, "END\n"]))
+    texts = []
+    for n_bytes, library in libraries.items():
+        program, options = tmp_path / f"frame{n_bytes}", [*option.split(), *default_integer(n_bytes, ".f")]
+        flags = [*library.pkg_config("--cflags", "--libs"), f"-Wl,-rpath,{library.pkg_config('--variable=libdir')[0]}"]
+        run([*COMPILERS[".f"], "-O2", "-ffp-contract=off", *options, "frame.f", "-o", program, *flags], cwd=folder)
+        texts.append(run([program], input=deck))
+    assert cards
+    assert len(texts[0].splitlines()) > 900
+    assert texts[0] == texts[1]
+
+
 @pytest.mark.skipif(shutil.which("cmake") is None or shutil.which("ctest") is None, reason="needs CMake")
 def test_cmake(libraries, tmp_path):
     flags = ["-DVARIANT=jointfrf64", "-DCMAKE_Fortran_FLAGS=-fdefault-integer-8"]
@@ -106,10 +148,10 @@ def test_include_file_refuses(libraries, tmp_path, own, other, form):
     source = tmp_path / f"program.{form}"
     source.write_text("      include 'jointfrf.inc'\n      end\n")
     words = refusal(libraries[own], source, tmp_path / "program", *default_integer(other, source.suffix))
-    (line,) = re.findall(r"jointfrf\.inc:(\d+):\d+:\s+.*Division by zero", words)
-    (include_dir,) = (flag.removeprefix("-I") for flag in libraries[own].pkg_config("--cflags") if "-I" in flag)
-    reported = (Path(include_dir) / "jointfrf.inc").read_text().splitlines()
-    assert f"JF_NEEDS_{own}_BYTE_INTEGERS" in reported[int(line) - 1]
+    (error,) = re.findall(r"^(?:Fatal )?Error: (.*)$", words, re.MULTILINE)
+    assert f"jf_integers_have_{other}_bytes" in error
+    assert f"jf_link_{libraries[other].name}‘" in error.replace("’", "‘")
+    assert f"jf_or_compile_with_{own}_bytes" in error
     libraries[own].compile(source, tmp_path / "good", *default_integer(own, source.suffix), "-Wno-unused-parameter")
 
 
@@ -171,7 +213,7 @@ def test_exported_symbols(libraries):
     for n_bytes, library in libraries.items():
         (lib_dir,) = library.pkg_config("--variable=libdir")
         exported = run(["nm", "-D", "--defined-only", f"{lib_dir}/lib{library.name}.so"]).splitlines()
-        expected = [f"{name}@@{library.name}_0".replace("have_4", f"have_{n_bytes}") for name in LISTED]
+        expected = [f"{name}@@{library.name}_0".replace("have_4", f"have_{n_bytes}") for name in EXPORTED]
         assert [line.split()[-1] for line in exported if " A " not in line] == sorted(expected)
 
 

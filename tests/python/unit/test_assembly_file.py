@@ -357,7 +357,7 @@ def test_the_page_and_the_plot_of_a_model(tmp_path, frfs):
     drawn = jf.plot(fit)
     assert len(drawn.axes) >= 8
     loaded = jf.load(jf.save(fit, tmp_path / "fit.json"))
-    with pytest.raises(ValueError, match="this fit holds none"):
+    with pytest.raises(ValueError, match="this fit contains no measured FRFs"):
         jf.write_report(loaded, tmp_path / "again.html")
     assert len(jf.plot(loaded).axes) == 4
 

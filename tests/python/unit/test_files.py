@@ -3,12 +3,13 @@
 import errno
 import os
 import stat
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 from jointfrf.errors import FileContentError
-from jointfrf.files import below, write_file
+from jointfrf.files import OwnFolder, clean_name, write_file
 
 
 def test_a_file_is_replaced_and_nothing_else_is_left(tmp_path):
@@ -148,26 +149,111 @@ def test_a_message_names_the_file(tmp_path, monkeypatch):
     "name", ["../../pwn", "/etc/passwd", "a/b", ".bashrc", "-rf", "a\0b", "x" * 300, "a\nb", "ä:y", ""]
 )
 def test_a_name_of_anybody_is_that_of_a_file_in_the_folder(tmp_path, name):
-    path = below(tmp_path, name, ".png")
-    write_file(path, b"")
+    own = OwnFolder(tmp_path)
+    path = own.write(clean_name(name, ".png"), b"")
     assert path.parent == tmp_path
     assert [each.name for each in tmp_path.iterdir()] == [path.name]
     assert path.name.isascii()
     assert path.name.isprintable()
-    assert path != below(tmp_path, name + "_", ".png")
+    assert path.name != clean_name(name + "_", ".png")
 
 
-def test_usual_names_stay_as_they_are(tmp_path):
+def test_usual_names_stay_as_they_are():
     for name in ("k-theta_x", "4.2", "identification.json", "a+b,c=1"):
-        assert below(tmp_path, name) == tmp_path / name
+        assert clean_name(name) == name
 
 
-def test_a_link_out_of_a_folder_of_results_is_not_followed(tmp_path):
-    folder = tmp_path / "results"
-    folder.mkdir()
-    (folder / "report.html").symlink_to(tmp_path / "secret")
-    (folder / "tables").symlink_to(tmp_path)
-    with pytest.raises(FileContentError, match="is a link out of its folder, to which nothing is written; remove it"):
-        below(folder, "report.html")
-    (folder / "inside").symlink_to("other")
-    assert below(folder, "inside") == folder / "inside"
+def test_a_name_with_a_folder_is_none(tmp_path):
+    for name in ("../a", "/a", "a/b", ""):
+        with pytest.raises(ValueError, match="is not a name: make one by clean_name"):
+            OwnFolder(tmp_path).write(name, "")
+
+
+@pytest.fixture
+def results(tmp_path) -> OwnFolder:
+    """A folder in a folder, and beside both a file of the user."""
+    (tmp_path / "secret").write_text("of the user")
+    return (OwnFolder(tmp_path / "results") / "tables").make()
+
+
+@pytest.mark.parametrize("goal", ["../../secret", "../../new", "a.csv", "other", "/dev/null"])
+def test_a_link_in_a_folder_of_results_is_not_followed(results, tmp_path, goal):
+    results.write("other", "own")
+    (results.path / "a.csv").symlink_to(goal)
+    with pytest.raises(FileContentError, match=r"a\.csv is a link, not a file of its own: remove it"):
+        results.write("a.csv", "new")
+    with pytest.raises(FileContentError, match="is a link"), results.opened("a.csv"):
+        pass
+    assert (tmp_path / "secret").read_text() == "of the user"
+    assert sorted(path.name for path in results.path.iterdir()) == ["a.csv", "other"]
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_folder_of_results_that_is_a_link_is_not_entered(results, tmp_path):
+    results.path.rmdir()
+    results.path.symlink_to(tmp_path)
+    for call in (results.make, results.entries, results.check, lambda: results.write("secret", "")):
+        with pytest.raises(FileContentError, match="tables is a link or no folder, not a folder of its own: remove it"):
+            call()
+    assert (tmp_path / "secret").read_text() == "of the user"
+
+
+@pytest.mark.parametrize("made", [os.mkfifo, os.mkdir], ids=["pipe", "folder"])
+def test_what_is_no_file_in_a_folder_of_results_is_rejected(results, made):
+    made(results.path / "a.csv")
+    for call in (lambda: results.write("a.csv", "new"), lambda: results.opened("a.csv").__enter__()):
+        with pytest.raises(FileContentError, match=r"is a (pipe or a device|folder), not a file of its own"):
+            call()
+
+
+@pytest.mark.skipif(os.open not in os.supports_dir_fd, reason="this system opens nothing relative to a folder")
+@pytest.mark.parametrize("when", ["stat", "open", "replace"])
+def test_a_link_put_there_between_check_and_use_is_not_followed(results, tmp_path, monkeypatch, when):
+    """Somebody else who may write into the folder exchanges it, and the file, for links to the user's."""
+    results.write("secret", "old")
+    used = getattr(os, when)
+    folder = results.path
+
+    def exchanged(path, *arguments, **options):
+        if "secret" in str(path) and folder.is_dir() and not folder.is_symlink():
+            folder.rename(tmp_path / "moved")
+            folder.symlink_to(tmp_path)
+            if when != "replace":
+                (tmp_path / "moved" / "secret").unlink()
+                (tmp_path / "moved" / "secret").symlink_to(tmp_path / "secret")
+        return used(path, *arguments, **options)
+
+    monkeypatch.setattr(os, when, exchanged)
+    with suppress(FileContentError):
+        results.write("secret", "new")
+    assert (tmp_path / "secret").read_text() == "of the user"
+    assert (tmp_path / "moved").is_dir()
+    with suppress(FileContentError), results.opened("secret") as file:
+        assert file.read() != b"of the user"
+
+
+def test_a_file_of_a_folder_keeps_its_mode_and_is_whole_or_as_it_was(results, monkeypatch):
+    path = results.write("a.csv", "old")
+    path.chmod(0o640)
+    if os.getuid() == 0:
+        os.chown(path, 1234, 4321)
+    before = path.stat()
+    results.write("a.csv", "new")
+    after = path.stat()
+    assert (path.read_text(), after.st_mode, after.st_uid) == ("new", before.st_mode, before.st_uid)
+    with pytest.raises(TypeError), results.written("a.csv") as file:
+        file.writelines([b"half", "a text"])
+    done = []
+    monkeypatch.setattr(os, "fsync", lambda handle: done.append(os.fstat(handle).st_size))
+    results.write("b.csv", "four")
+    assert done == [4]
+
+    def full(_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left on device") as caught:
+        results.write("a.csv", "newer")
+    assert caught.value.filename == str(path)
+    assert path.read_text() == "new"
+    assert sorted(results.entries()) == ["a.csv", "b.csv"]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from abi import prototypes
+from abi import SPELT, prototypes
 from generate import signatures
 from generate.__main__ import main
 from generate.reader import read_api
@@ -19,7 +19,10 @@ ROOT = Path(__file__).resolve().parents[3]
 API = ROOT / "fortran" / "api"
 VALUES = [ROOT / "fortran" / name for name in ("status.f90", "engine.F90")]
 TEXT = (API / "api.F90").read_text()
-OUTPUTS = {"header": "jointfrf.h", "include": "jointfrf.inc", "work": "api_work.F90", "signatures": "_kernel.pyf"}
+OUTPUTS = {
+    "header": "jointfrf.h", "include": "jointfrf.inc", "work": "api_work.F90", "signatures": "_kernel.pyf",
+    "symbols": "symbols.c",
+}  # fmt: skip
 
 
 def generate(folder: Path, text: str = TEXT, what=(*OUTPUTS, "reference"), *options: str) -> dict[str, str]:
@@ -60,7 +63,7 @@ def test_constants_are_those_of_the_kernel(files):
     constants = dict(re.findall(r"^#define (JF_\w+) \(?(-?\d+)\)?$", files["jointfrf.h"], re.MULTILINE))
     include = files["jointfrf.inc"]
     assert dict(re.findall(r"^ {6}PARAMETER \((\w+) = (-?\d+)\)$", include, re.MULTILINE)) == constants
-    assert re.findall(r"^ {6}INTEGER (JF_(?!NEEDS)\w+)$", include, re.MULTILINE) == list(constants)
+    assert re.findall(r"^ {6}INTEGER (JF_\w+)$", include, re.MULTILINE) == list(constants)
     assert max(map(len, include.splitlines())) <= 72
     declared = " ".join(
         re.findall(r"parameter, public :: (.*)$", "".join(path.read_text() for path in VALUES), re.MULTILINE)
@@ -69,15 +72,27 @@ def test_constants_are_those_of_the_kernel(files):
     assert {f"jf_{name}".replace("engine_v", "engine_x86_64_v").upper(): kernel[name] for name in kernel} == constants
 
 
+def test_other_symbols_hand_over_the_arguments_of_each_routine(files):
+    found = re.findall(r"^void (jf_\w+)\((.*)\) \{ (jf_\w+_)\((.*)\); \}$", files["symbols.c"], re.MULTILINE)
+    assert sorted(name for name, *_ in found) == sorted(SPELT)
+    listed = prototypes()
+    for _, declared, called, passed in found:
+        assert declared.split(", ") == listed[called]
+        assert passed.split(", ") == [argument.rpartition("*")[2] for argument in listed[called]]
+
+
 @pytest.mark.parametrize(
-    ("n_bytes", "library", "other", "share"),
-    [("4", "jointfrf", "jointfrf64", "32/BIT_SIZE(0)"), ("8", "jointfrf64", "jointfrf", "BIT_SIZE(0)/64")],
+    ("n_bytes", "library", "other", "other_bytes"),
+    [("4", "jointfrf", "jointfrf64", 8), ("8", "jointfrf64", "jointfrf", 4)],
 )
-def test_include_file_names_its_library(tmp_path, n_bytes, library, other, share):
+def test_include_file_names_its_library(tmp_path, n_bytes, library, other, other_bytes):
     include = generate(tmp_path, TEXT, ["include"], "--integer-bytes", n_bytes)["jointfrf.inc"]
     assert include.startswith(f"! {library}: ")
     assert f"the library {other} instead" in include
-    assert f"PARAMETER (JF_NEEDS_{n_bytes}_BYTE_INTEGERS = 1/({share}))" in include
+    assert (
+        f"      INTERFACE JF_INTEGERS_HAVE_{other_bytes}_BYTES\n        SUBROUTINE JF_LINK_{other.upper()}(I)\n"
+        in include
+    )
 
 
 def test_signatures_hide_trans_and_take_its_shapes(files):
@@ -152,7 +167,8 @@ def test_an_added_argument_appears_in_all_outputs(files, tmp_path):
         assert '.BR added " (in, DOUBLE PRECISION (*))"\nweights, shape (n, 2)' in new[page]
     assert "- `added` (in, DOUBLE PRECISION `(*)`): weights" in new["jointfrf.md"]
     changed = {name for name in new if new[name] != files[name]}
-    assert changed == {"jointfrf.h", "_kernel.pyf", "api_work.F90", "jf_modify.3", "jf_modify_work.3", "jointfrf.md"}
+    generated = {"jointfrf.h", "symbols.c", "_kernel.pyf", "api_work.F90"}
+    assert changed == {*generated, "jf_modify.3", "jf_modify_work.3", "jointfrf.md"}
 
 
 ROUTINE = """
@@ -194,7 +210,7 @@ def test_an_added_routine_appears_in_all_outputs(files, tmp_path):
     assert "- `scale` (in, DOUBLE PRECISION): factor of the inverse" in new["jointfrf.md"]
     assert {name for name in new if name not in files} == {"jf_scaled_inverse.3", "jf_scaled_inverse_work.3"}
     changed = {name for name in files if new[name] != files[name]}
-    assert changed == {"jointfrf.h", "_kernel.pyf", "api_work.F90", "jointfrf.3", "jointfrf.md"}
+    assert changed == {"jointfrf.h", "symbols.c", "_kernel.pyf", "api_work.F90", "jointfrf.3", "jointfrf.md"}
 
 
 def test_an_added_constant_appears_in_header_and_include_file(files, tmp_path):

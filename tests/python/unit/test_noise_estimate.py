@@ -22,3 +22,13 @@ def test_noise_from_reciprocity_does_not_count_zeros():
     h = np.where(inside, h, 1e-14 * np.random.default_rng(1).standard_normal(h.shape))
     assert reciprocity_noise(h)[0] == pytest.approx(0.03, rel=0.1)
     assert reciprocity_noise(h * np.eye(6))[0] == 0
+
+
+@pytest.mark.parametrize("shape", [(0, 2, 2), (0, 0, 0), (5, 0, 2), (5, 2, 0), (1, 0, 0)])
+@pytest.mark.parametrize("function", [jf.estimate_noise, jf.smooth_frfs])
+@pytest.mark.parametrize("options", [{}, {"reciprocal": False}])
+def test_frfs_of_nothing_are_rejected(shape, function, options):
+    """Without lines the noise was an IndexError after a warning of numpy."""
+    message = rf"h has no FRFs, its shape is {' x '.join(map(str, shape))}: give at least one frequency line"
+    with pytest.raises(ValueError, match=message):
+        function(np.arange(1.0, shape[0] + 1), np.ones(shape, complex), **options)

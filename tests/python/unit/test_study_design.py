@@ -58,10 +58,10 @@ def test_a_rubber_mount_has_the_same_factors():
     ("factors", "message"),
     [
         ({"noise": [-1.0]}, r"case.toml with noise = -1.0: .*level must be a number, at least 0, not -1.0"),
-        ({"lines": [1]}, "lines must be whole numbers, at least 2, not 1"),
-        ({"joint.stifness": [1.0]}, "no key for the factor 'joint.stifness'"),
-        ({"joint[7].stiffness": [1.0]}, "no key for the factor"),
-        ({"joint..stiffness": [1.0]}, "is not a key such as joint.stiffness"),
+        ({"lines": [1]}, "lines is 1; give a whole number, at least 2"),
+        ({"joint.stifness": [1.0]}, "unknown factor 'joint.stifness'"),
+        ({"joint[7].stiffness": [1.0]}, "unknown factor"),
+        ({"joint..stiffness": [1.0]}, "is no key; write one such as joint.stiffness"),
         ({"joint.dof*": [2.0]}, "dof = 'Fy' cannot be multiplied by 2.0"),
         ({"substructure_a.elements": [2.5]}, "elements must be a whole number, at least 1, not 2.5"),
         ({"frequency.last": [100.0]}, "no frequency line"),
@@ -73,7 +73,7 @@ def test_what_the_case_does_not_take_is_said(factors, message):
 
 
 def test_factors_without_sense():
-    with pytest.raises(ValueError, match="must have a list of values"):
+    with pytest.raises(ValueError, match="has no values; give at least one"):
         jf.StudyDesign({"noise": []})
     with pytest.raises(ValueError, match="a value twice: 1, 1"):
         jf.StudyDesign({"noise": [1, 1]})

@@ -1,6 +1,7 @@
 """What a study keeps and says: chunks that overlap, damaged ones, moments, coverage, files."""
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -61,7 +62,7 @@ def test_moments_are_those_of_all_realisations(whole, drawn):
 
 def test_percentiles_of_very_many_are_those_of_the_first(whole, drawn, monkeypatch):
     monkeypatch.setattr("jointfrf.studies.summary._SAMPLE", 30)
-    row = summarise(StudyStore(whole.folder))[0]
+    row = summarise(StudyStore(whole.folder), whole.record)[0]
     assert row.median == np.median(drawn.values[:10, 0])
     assert row.mean == pytest.approx(drawn.values[:, 0].mean(), rel=1e-12)
 
@@ -86,9 +87,11 @@ def test_a_group_that_is_none_is_said(whole, group):
 def test_what_is_missing(drawn, tmp_path):
     store = stored(tmp_path, drawn, (0, 7, 300), levels=(0.01,))
     store.write(0, 500, Estimates(*(part[500:600] for part in drawn)))
-    assert store.missing(2, Span(0, 1000)) == [[Span(300, 200), Span(600, 400)], [Span(0, 1000)]]
-    assert store.missing(1, Span(100, 350)) == [[Span(300, 150)]]
-    assert store.missing(1, Span(10, 20)) == [[]]
+    record = store.read()
+    assert store.missing(record, Span(0, 1000)) == [[Span(300, 200), Span(600, 400)]]
+    assert store.missing(record, Span(100, 350)) == [[Span(300, 150)]]
+    assert store.missing(record, Span(10, 20)) == [[]]
+    assert store.missing(replace(record, groups=record.groups * 2), Span(10, 20))[1] == [Span(10, 20)]
     assert jf.StudyResult(tmp_path).missing == 600
     assert "600 realisations of 1000 are missing" in jf.StudyResult(tmp_path).table.note
 
@@ -101,7 +104,7 @@ def test_a_file_cut_short_is_named_and_an_empty_one_is_missing(drawn, tmp_path):
     with pytest.raises(jf.FileContentError, match=f"{chunk.name} is damaged .*: delete it"):
         jf.StudyResult(tmp_path).estimates(0)
     chunk.write_bytes(b"")
-    assert store.missing(1, Span(0, COUNT)) == [[Span(7, 293)]]
+    assert store.missing(store.read(), Span(0, COUNT)) == [[Span(7, 293)], []]
     (tmp_path / "study.json").write_text('{"format": 9}')
     with pytest.raises(jf.FileContentError, match="another version"):
         jf.read_study(tmp_path)

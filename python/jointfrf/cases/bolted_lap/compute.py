@@ -356,11 +356,11 @@ def estimate_groups(case: BoltedLapCase, choice: StudyChoice) -> list[EstimateGr
     The joint that the solid model has is not known: there are no actual values.
     """
     if choice.own_estimators or choice.own_noises:
-        raise ValueError("own estimators and own noises need a case of kind known-joint")
+        raise ValueError("own estimator or noise in a case of kind bolted-lap; use a case of kind known-joint")
     for word in choice.estimators:
         if word not in _ESTIMATORS:
-            hint = did_you_mean(word, _ESTIMATORS) or f": {', '.join(_ESTIMATORS)}"
-            raise ValueError(f"a bolted lap joint has no estimator {word!r}{hint}")
+            hint = did_you_mean(word, _ESTIMATORS) or f"; use one of {', '.join(_ESTIMATORS)}"
+            raise ValueError(f"unknown estimator {word!r} in a case of kind bolted-lap{hint}")
     solid = solid_frfs(case, case.beams.lengths[1], True)
     groups = []
     for noise in chosen_noises(case.noises, choice):

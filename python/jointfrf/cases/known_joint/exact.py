@@ -151,7 +151,7 @@ def _dof_weights(structure: Structure, dofs: Sequence[str], spacing: float) -> l
         along, axis, sign = _SLOPES["theta_z" if direction == "theta" else direction_names([direction])[0]]
         places = structure.places
         if node not in places:
-            raise ValueError(f"the place of node {node} is not known: no difference can stand for {dof}")
+            raise ValueError(f"node {node} has no coordinates for a difference in place of {dof}; give its coordinates")
         ends = set()
         for way in (-1, 1):
             wanted = places[node] + way * spacing * np.eye(3)[axis]
@@ -160,7 +160,7 @@ def _dof_weights(structure: Structure, dofs: Sequence[str], spacing: float) -> l
                 ends.add(nearest)
         if not ends:
             raise ValueError(
-                f"no node lies {spacing:g} m beside {node} along {'xyz'[axis]}: rotation {dof} has no difference"
+                f"no node lies {spacing:g} m beside {node} along {'xyz'[axis]} for rotation {dof}; change the spacing"
             )
         nodes = sorted(ends) if len(ends) == 2 else [node, *ends]
         slopes = difference_weights([places[one][axis] - places[node][axis] for one in nodes])[1]

@@ -358,8 +358,8 @@ class OwnEstimatorSource:
         found = np.array([self.estimator(self.freq_hz, gamma, self.dofs) for gamma in drawn], float)
         if found.shape != (count, 2 * len(self.dofs)):
             raise ValueError(
-                f"an estimator must return {2 * len(self.dofs)} numbers: stiffness of {', '.join(self.dofs)}, then "
-                f"damping, not an array of shape {found.shape[1:]}"
+                f"an estimator returned an array of shape {found.shape[1:]}; return {2 * len(self.dofs)} numbers, "
+                f"stiffness of {', '.join(self.dofs)}, then damping"
             )
         return Estimates.without_intervals(found)
 
@@ -369,7 +369,7 @@ def estimate_groups(case: KnownJointCase, choice: StudyChoice) -> list[EstimateG
     for word in choice.estimators:
         if word not in METHODS and word not in choice.own_estimators:
             raise ValueError(
-                f"there is no estimator {word!r}{did_you_mean(word, METHODS) or ': ' + ', '.join(METHODS)}"
+                f"unknown estimator {word!r}{did_you_mean(word, METHODS) or '; use one of ' + ', '.join(METHODS)}"
             )
     exact = exact_frfs(case)
     return [

@@ -154,9 +154,9 @@ class ModelFitSource:
 def estimate_groups(case: ModelledJointCase, choice: StudyChoice) -> list[EstimateGroup]:
     """Return what a study computes: the fit with models."""
     if choice.own_estimators or choice.own_noises or choice.noises:
-        raise ValueError("a modelled joint has one noise, [measured] noise, and one estimator, model-fit")
+        raise ValueError("own estimator or noise in a case of kind modelled-joint; use the noise of [measured]")
     if any(word != _ESTIMATOR for word in choice.estimators):
-        raise ValueError(f"a modelled joint has the estimator model-fit only, not {choice.estimators[0]!r}")
+        raise ValueError(f"unknown estimator {choice.estimators[0]!r} in a case of kind modelled-joint; use model-fit")
     exact = case.truth.receptance(case.freq_hz, case.responses, case.forces)
     fit = fit_of_exact(case, exact)
     names = tuple(fit.std_error)

@@ -220,7 +220,7 @@ def _of_bulk(path: Path, limit: ReadLimit) -> NodeFile:
 
 
 #: Fields of a line of NBLOCK, such as (3i9,6e21.13e3) or (1i7,2i9,6e21.13); and the longest line.
-_FORMAT, _LINE = re.compile(r"(\d{0,3})\s*([ie])\s*(\d{1,3})", re.IGNORECASE), 1000
+_FORMAT, _LINE = re.compile(r"(\d{0,3}) {0,20}([ie]) {0,20}(\d{1,3})", re.IGNORECASE), 1000
 
 
 def _of_ansys(path: Path, limit: ReadLimit) -> NodeFile:
