@@ -38,8 +38,13 @@ def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         "Couple two substructures by a joint (2.26) and write the FRFs of the assembly. A substructure is a file of "
-        "FRFs or a TOML file of a model; the joint is a JSON file of identify --save, or a TOML file with dofs, "
+        "FRFs or a TOML file of a model. The joint is a JSON file of identify --save, or a TOML file with dofs, "
         "stiffness, damping, loss_factor, or with laws of its DOFs."
+    )
+    parser.requires("--joint", "--j", "--k", "--output")
+    parser.examples.append(
+        "jointfrf couple cases/two-beams/a.toml cases/two-beams/b.toml --joint cases/two-beams/joint.toml --j 11 --k 1 "
+        "--renumber-b 100 --band 20:800 --step 1 --output assembly.uff"
     )
     parser.add_argument("a", type=Path, metavar="A", help="substructure A: file of FRFs, or model (.toml)")
     parser.add_argument("b", type=Path, metavar="B", help="substructure B")
@@ -52,11 +57,11 @@ def add_arguments(parser: CommandParser) -> None:
 def add_joint_arguments(parser: CommandParser) -> None:
     """Describe the joint, and where it is in its parts."""
     parser.option("--joint FILE", "the joint: .json or .toml", Path)
-    parser.option("--j NODES", "node of A at the joint, which has its DOFs; or, with --at, nodes around it", nodes)
-    parser.option("--k NODES", "node or nodes of B", nodes)
+    parser.option("--j NODES", "node of A at the joint, with all joint DOFs; with --at, nodes around the joint", nodes)
+    parser.option("--k NODES", "node of B at the joint; with --at, nodes around it", nodes)
     parser.option("--at X,Y,Z", "reference point of virtual points, m", point)
-    parser.option("--renumber-b N", "add N to the nodes of B, where both have the same", int, 0)
-    parser.option("--shift-b X,Y,Z", "add this to the coordinates of B, m", point, (0.0, 0.0, 0.0))
+    parser.option("--renumber-b N", "number added to the nodes of B, if A and B have equal numbers", int, 0)
+    parser.option("--shift-b X,Y,Z", "vector added to the coordinates of B, m", point, (0.0, 0.0, 0.0))
 
 
 def renumbered(frfs: FrfSet, add: int, shift: Sequence[float] = (0.0, 0.0, 0.0)) -> FrfSet:
@@ -82,9 +87,6 @@ def joint_channels_of(node: int, dofs: Sequence[str]) -> list[Channel]:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
-    for name, value in (("--joint", args.joint), ("--j", args.j), ("--k", args.k), ("--output", args.output)):
-        if value is None:
-            raise UsageError(f"{name} is missing: jointfrf couple A B --joint FILE --j NODE --k NODE --output FILE")
     check_target(args.output)
     found = read_joint_file(args.joint)
     a, b = read_structures([args.a, args.b], lines_of(args), **reading_options(args))

@@ -56,23 +56,35 @@ def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         "Write a joint as input of a finite-element program: abaqus (springs and dashpots, or matrices), calculix "
-        "(springs), nastran (CBUSH, or DMIG) or ansys (MATRIX27), with comments on what each number is worth."
+        "(springs), nastran (CBUSH, or DMIG) or ansys (MATRIX27), with the interval of each number as a comment."
     )
-    parser.add_argument("joint", type=Path, help="JSON file of identify --save, or a TOML file of constants or laws")
+    parser.examples += [
+        "jointfrf export joint.json nastran:9001,9002 --output joint.bdf",
+        "jointfrf export joint.json calculix:9001,9002,9003,9004 --nodes-at 0.05,0,0,0.07,0,0 --output joint.inp",
+    ]
+    parser.add_argument(
+        "joint", type=Path, metavar="JOINT", help="JSON file of identify --save, or a TOML file of constants or laws"
+    )
     parser.add_argument(
         "export",
         type=parse_export,
         metavar="PROGRAM:J,K",
-        help="program and nodes j and k of its model: nastran:9001,9002; calculix: two ROT NODEs more for rotations; "
-        "of several joints nastran:fl=9001,9002:fr=9003,9004",
+        help="program and nodes j and k of its model: nastran:9001,9002; rotations of calculix need two ROT NODEs "
+        "after them; several joints: nastran:fl=9001,9002:fr=9003,9004",
     )
     parser.option(
         "--frequency HZ",
-        "where laws that depend on frequency are taken; LOW:HIGH writes tables over frequency (abaqus, nastran)",
+        "frequency at which frequency-dependent laws are evaluated; LOW:HIGH writes tables over frequency (abaqus, "
+        "nastran)",
         _frequency,
     )
-    parser.option("--point NAME", "of a fit of several joint points: the one that is written: bolt1")
-    parser.option("--joint-at X,Y,Z", "reference point of the joint in the model, in its unit of length (saved)", point)
+    parser.option("--point NAME", "joint point to write, from a fit of several joint points: bolt1")
+    parser.option(
+        "--joint-at X,Y,Z",
+        "reference point of the joint in the model, in its unit of length",
+        point,
+        otherwise="the saved reference point",
+    )
     add_card_arguments(parser)
 
 
@@ -196,7 +208,7 @@ def _terms(joint: Joint | None) -> tuple[str, str]:
 
 def _points(args: argparse.Namespace, found: JointFile) -> FloatArray | None:
     if args.joint_at is not None:
-        return np.tile(args.joint_at, (2, 1)) * model_units(args.units or "SI").length
+        return np.tile(args.joint_at, (2, 1)) * model_units(args.units).length
     return found.points
 
 
@@ -275,27 +287,30 @@ def _positions(text: str) -> tuple[tuple[float, ...], ...]:
 
 def add_card_arguments(parser: CommandParser) -> None:
     """Describe what belongs to the cards of any program."""
-    parser.option("--output FILE", "write the cards into this file: joint.bdf", Path)
+    parser.option("--output FILE", "file for the cards: joint.bdf", Path)
     parser.option(
         "--nodes-at XJ,YJ,ZJ,XK,YK,ZK",
-        "where the two nodes of the model are, in its unit of length: rigid arms lead from them to the reference point "
-        "of the joint (without it the nodes are taken to lie there)",
+        "positions of the two nodes of the model, in its unit of length; rigid arms connect them to the reference "
+        "point of the joint",
         _positions,
+        otherwise="the reference point",
     )
-    parser.option("--units SYSTEM", "units of the model: SI, mm-t-s or mm-kg-ms (SI)", get_args(UnitSystemName))
+    parser.option("--units", "units of the model", get_args(UnitSystemName), "SI")
     parser.option(
         "--faces J1,J2,...:K1,K2,...",
-        "nodes of solid elements that follow the two nodes as rigid bodies (with --model those of rigid reference "
-        "points of the joint; without any such cards are a comment)",
+        "nodes of solid elements that follow the two nodes as rigid bodies",
         _faces,
+        otherwise="with --model the nodes of rigid reference points, else a comment to fill in",
     )
-    parser.option("--element N", "first number of new elements (1)", positive, 1)
-    parser.option("--property N", "first number of properties (1)", positive, 1)
-    parser.option("--full-matrix", "matrices where springs would do (abaqus, nastran)")
-    parser.option("--connector", "abaqus: a connector element, which direct steady-state steps take, not matrices")
-    parser.option("--all-damping", "also dashpots that are negative or not significantly above zero")
-    parser.option("--bounds", "also stiffnesses of which only a bound is known, by their best estimates")
-    parser.option("--no-damping", "no damping in the cards")
+    parser.option("--element N", "first number of new elements", positive, 1)
+    parser.option("--property N", "first number of new properties", positive, 1)
+    parser.option("--full-matrix", "write matrices even if springs suffice (abaqus, nastran)")
+    parser.option(
+        "--connector", "write a connector element, for direct steady-state steps, instead of matrices (abaqus)"
+    )
+    parser.option("--all-damping", "include dashpots that are negative or not significantly above zero")
+    parser.option("--bounds", "include stiffnesses with an unbounded interval, by their best estimates")
+    parser.option("--no-damping", "leave out all damping")
 
 
 def card_request(
@@ -319,14 +334,9 @@ def card_request(
         The program cannot hold it, or a number is out of range.
     """
     if args.export is None:
-        for name, given in (
-            ("--output", args.output),
-            ("--nodes-at", args.nodes_at),
-            ("--units", args.units),
-            ("--faces", args.faces),
-        ):
-            if given is not None:
-                raise UsageError(f"{name} is for cards: say --export PROGRAM:J,K, too")
+        for name in ("--output", "--nodes-at", "--units", "--faces"):
+            if name.removeprefix("--").replace("-", "_") in args.given:
+                raise UsageError(f"{name} is for cards; add --export PROGRAM:J,K")
         flags = ("--element", "--property", "--full-matrix", "--connector", "--all-damping", "--bounds", "--no-damping")
         warn_of_ignored(args, flags, "it is for cards, --export PROGRAM:J,K")
         return None
@@ -341,13 +351,13 @@ def card_request(
         "damping": not args.no_damping and program != "calculix",  # it has none between DOFs; the text says so
         "full_matrix": args.full_matrix,
         "connector": args.connector,
-        "units": args.units or "SI",
+        "units": args.units,
         "faces": args.faces,
     }
     if args.nodes_at is not None:
         options["positions"] = np.array(args.nodes_at)
         if points is not None:
-            options["points"] = points / model_units(args.units or "SI").length
+            options["points"] = points / model_units(args.units).length
     request = CardRequest(program, of_joints or ends[:2], options, args.all_damping, args.bounds, args.output)
     try:
         for name, own in (of_joints or {"": ends}).items():

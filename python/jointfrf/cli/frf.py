@@ -41,6 +41,8 @@ __all__ = [
 
 #: Options that name files of matrices.
 _MATRICES = ("stiffness", "mass", "damping", "structural_damping")
+#: FRFs between more DOFs are hardly meant.
+_MOST_DOFS = 240
 
 
 def add_arguments(parser: CommandParser) -> None:
@@ -49,15 +51,22 @@ def add_arguments(parser: CommandParser) -> None:
         f"Compute receptances of a model and write them as {format_names(written=True)}. The model is a TOML file with "
         "the keys of a substructure of a case (chain, beam, brick-beam, matrices), or matrices named by options."
     )
-    parser.add_argument("model", nargs="?", type=Path, help="TOML file of a model; or --stiffness and --mass")
+    parser.requires("MODEL", "--output", "--band", "--step")
+    parser.requires("MODEL", "--output", "--lines-of")
+    parser.requires("--stiffness", "--mass", "--dof-names", "--output", "--band", "--step")
+    parser.examples.append("jointfrf frf cases/two-beams/a.toml --band 20:800 --step 1 --output a.uff")
+    parser.add_argument(
+        "model", nargs="?", type=Path, metavar="MODEL", help="TOML file of a model; or --stiffness, --mass, --dof-names"
+    )
     parser.option("--output FILE", f"file to write: {format_names(written=True)}", Path)
     add_line_arguments(parser)
-    parser.option("--lines-of FILE", "instead: the lines of this file of FRFs", Path)
-    parser.option("--points DOFS", "DOFs of the model: 3:y,3:theta (default: all, where they are few)", words)
-    parser.heading("matrices of your own (Matrix Market, or NPZ)")
-    for name, what in zip(_MATRICES, ("K, N/m", "M, kg", "viscous C, N s/m", "structural H, N/m"), strict=True):
-        parser.option(f"--{name.replace('_', '-')} FILE", what)
-    parser.option("--loss-factor ETA", "loss factor of the stiffness (0)", float)
+    parser.option("--lines-of FILE", "file of FRFs whose frequency lines are used, instead of --band and --step", Path)
+    parser.option("--points DOFS", "DOFs of the model: 3:y,3:theta", words, otherwise=f"all, up to {_MOST_DOFS}")
+    parser.heading("a model by its matrices (Matrix Market or NPZ)")
+    names = ("stiffness K, N/m", "mass M, kg", "viscous damping C, N s/m", "structural damping H, N/m")
+    for name, what in zip(_MATRICES, names, strict=True):
+        parser.option(f"--{name.replace('_', '-')} FILE", f"file of the {what}")
+    parser.option("--loss-factor ETA", "loss factor of the stiffness", float, 0.0)
     parser.option("--dof-names FILE", "text file, one DOF a line: 12:y, or 12 2")
     parser.heading("the file of --lines-of")
     add_reading_arguments(parser)
@@ -101,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
 def _table(args: argparse.Namespace) -> TomlTable:
     """Return the table of the model: that of the file, or one of the options."""
     given: dict[str, Any] = {name: getattr(args, name) for name in _MATRICES if getattr(args, name) is not None}
-    if args.loss_factor is not None:
+    if "loss_factor" in args.given:
         given["loss_factor"] = args.loss_factor
     if args.dof_names is not None:
         given["dofs"] = args.dof_names
@@ -118,8 +127,6 @@ def _table(args: argparse.Namespace) -> TomlTable:
     return TomlTable({"model": "matrices", **given}, "options")
 
 
-#: FRFs between more DOFs are hardly meant.
-_MOST_DOFS = 240
 #: Directions of channels, and how names of other DOFs that are rotations begin.
 CHANNEL_DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _TURNS = re.compile(r"m?theta|phi|rot")
@@ -149,8 +156,8 @@ def check_target(target: Path) -> None:
 
 def add_line_arguments(parser: CommandParser) -> None:
     """Describe the frequency lines of models."""
-    parser.option("--band LOW:HIGH", "first and last frequency in Hz", parse_band)
-    parser.option("--step HZ", "spacing of the lines, for models, with --band", float)
+    parser.option("--band LOW:HIGH", "first and last frequency, Hz", parse_band)
+    parser.option("--step HZ", "spacing of the frequency lines of models, Hz; needs --band", float)
 
 
 def lines_of(args: argparse.Namespace) -> FloatArray | None:

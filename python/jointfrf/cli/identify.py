@@ -64,73 +64,84 @@ def _methods(text: str) -> list[str]:
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Identify a joint from the FRFs of an assembly. Accelerances and mobilities become receptances. The DOFs of "
-        "the joint are those of virtual points of all channels around it (--at), of points along a line (rotations by "
-        "central differences), or of two nodes whose rotations are in the file. With models of both parts (--model) "
-        "any FRFs will do."
+        "Identify a joint from the FRFs of an assembly. Accelerances and mobilities are converted to receptances. The "
+        "joint DOFs are found in one of three ways: virtual points of all channels around the joint (--at), points "
+        "along a line (rotations by central differences), or two nodes whose rotations are in the file. With models of "
+        "both parts (--model), any FRFs of the assembly suffice."
     )
+    parser.requires("--j", "--k", "--dofs")
+    parser.requires("--at", "--channels", "--dofs")
+    parser.requires("--model")
+    parser.examples += [
+        "jointfrf identify cases/hammer-test/two_bars.uff --j 101,102 --k 201,202 --dofs y,rz --save joint.json",
+        "jointfrf identify cases/bending-sides/test.uff --at 0,0,0 --j 101:104 --k 201:204 --dofs y,rz "
+        "--side-j cases/bending-sides/side_j.toml --side-k cases/bending-sides/side_k.toml",
+        "jointfrf identify cases/lap-beam/level_1.uff --model cases/lap-beam/assembly.toml",
+    ]
     add_file_arguments(parser)
     add_model_arguments(parser)
     parser.heading("the fit")
-    parser.option(
-        "--method METHODS", f"one or several of {','.join(_METHODS)} (default: compliance)", _methods, ["compliance"]
-    )
+    parser.option("--method METHODS", f"one or several methods of {','.join(_METHODS)}", _methods, ["compliance"])
     parser.option(
         "--damping",
-        "damping terms of K* = k (1 + i eta) + i w c (default: auto, what the data support)",
+        "damping terms of K* = k (1 + i eta) + i w c; auto: the terms that the data support",
         (*get_args(DampingTerms), "auto"),
         "auto",
     )
     parser.option(
         "--cross",
-        "terms between the joint DOFs: none (default), not looked at, fitted within each of --points, fitted",
+        "terms between the joint DOFs; zero: none, ignore: not evaluated, points: fitted within each of --points, fit: "
+        "fitted",
         get_args(CrossTerms),
         "zero",
     )
-    parser.option(
-        "--same NAMES", "joint points that are equal and share their parameters: bolt1,bolt2", words, repeated=True
-    )
+    parser.option("--same NAMES", "equal joint points, which share their parameters: bolt1,bolt2", words, repeated=True)
     parser.option(
         "--side-j PART",
-        "with --side-k: part.toml, the model of side j alone, free of the other side, as [A] of assembly.toml: "
-        "corrects the FRFs for what the side bends between channels and joint",
+        "part.toml, model of side j alone, free of the other side (keys of [A] of assembly.toml): corrects the FRFs "
+        "for the flexibility of the side between channels and joint; needs --side-k",
         Path,
     )
-    parser.option("--side-k PART", "the same of side k", Path)
+    parser.option("--side-k PART", "part.toml, model of side k alone; needs --side-j", Path)
     add_law_arguments(parser)
-    parser.option("--noise LEVEL", "relative noise of the FRFs, 0.01 for 1 %% (default: from their reciprocity)", float)
+    parser.option(
+        "--noise LEVEL",
+        "relative noise of the FRFs; 0.01 means 1 %%",
+        float,
+        otherwise="estimated from the FRFs",
+    )
     parser.option(
         "--setup-gain LEVEL",
-        "relative standard deviation of the gain of one set-up, 0.01 for 1 %%: each file is one (default: from what "
-        "they differ by)",
+        "relative standard deviation of the gain of one set-up (each file is one); 0.01 means 1 %%",
+        float,
+        otherwise="estimated from the differences between the set-ups",
+    )
+    parser.option(
+        "--common-gain LEVEL",
+        "relative standard deviation of a gain that all FRFs share, such as the calibration of the hammer",
         float,
     )
     parser.option(
-        "--common-gain LEVEL", "that of a gain which all FRFs share, as by one calibration of the hammer", float
-    )
-    parser.option(
         "--accept-bent",
-        "fit FRFs that are bent by amplitude all the same, with a warning: they describe one test, not the structure",
+        "fit amplitude-dependent FRFs, with a warning: the result describes this test, not the structure",
     )
-    parser.option(
-        "--window-decay SIGMA", "exponential window exp(-SIGMA t) of the test, 1/s: taken off stiffnesses", float
-    )
+    parser.option("--window-decay SIGMA", "decay rate of the exponential window exp(-SIGMA t) of the test, 1/s", float)
     parser.option(
         "--bending-stiffness EI",
-        "E I of the thinner part in N m^2: says how much compliance the differences along a line add",
+        "E I of the thinner part in N m^2: prints the compliance that differences along a line add",
         float,
     )
     parser.heading("results")
     parser.option("--out DIR", "folder for identification.json and figures", Path)
-    parser.option("--report FILE", "the identification by method compliance as one HTML page", Path)
-    parser.option("--space", "with --report: a view in space with moving deformation; needs plotly, 5 MB more")
-    parser.option("--save FILE", "keep the joint (by the first method) in a JSON file", Path)
-    parser.option("--save-lines", "with --save: K* of each line, too, which makes the file many times as long")
+    parser.option("--report FILE", "HTML page of the identification by method compliance", Path)
+    parser.option("--space", "add a 3D view with moving deformation to --report; needs plotly, adds 5 MB")
+    parser.option("--save FILE", "JSON file for the joint found by the first method", Path)
+    parser.option("--save-lines", "add K* of each line to --save; the file becomes many times as long")
     parser.option(
         "--export PROGRAM:J,K",
-        "the joint (by the first method) as input of abaqus, calculix (stiffness only), nastran or ansys, between "
-        "its nodes J and K: abaqus:9001,9002; rotations of calculix need two ROT NODEs after them; of several joints "
-        "abaqus:fl=9001,9002:fr=9003,9004",
+        "write the joint found by the first method as input of abaqus, calculix (stiffness only), nastran or ansys, "
+        "between its nodes J and K: abaqus:9001,9002; rotations of calculix need two ROT NODEs after them; several "
+        "joints: abaqus:fl=9001,9002:fr=9003,9004",
         parse_export,
     )
     add_card_arguments(parser)

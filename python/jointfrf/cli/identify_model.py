@@ -44,22 +44,21 @@ _WIDTH = 100
 
 def add_model_arguments(parser: CommandParser) -> None:
     """Describe the assembly, and several tests."""
-    parser.heading("an assembly whose parts are known")
+    parser.heading("an assembly of parts with models")
     parser.option(
         "--model FILE",
-        "assembly.toml: both parts as models or FRFs, the joint, what else is unknown, which channel is which DOF; "
-        "then any FRFs will do, and none at the joint are needed",
+        "assembly.toml: both parts as models or FRFs, the joint, other unknowns, the DOF of each channel; any FRFs of "
+        "the assembly suffice then",
         Path,
     )
     parser.option(
         "--each",
-        "with --model: every file is a test of its own (levels, assemblies); one table of all, and the name of each "
-        "file in those of --save, --report, --output and in the folder of --out",
+        "with --model: fit every file as a test of its own (levels, assemblies) and print one table; the name of each "
+        "file is added to the files of --save, --report, --output and to the folder of --out",
     )
     parser.option(
         "--find-wrong-channels",
-        "with --model: look for a channel of the opposite sign, or two exchanged ones, with which the models fit; a "
-        "warning names what was found",
+        "with --model: search for a channel of opposite sign or two exchanged channels that the models contradict",
     )
 
 

@@ -36,15 +36,15 @@ def _law(text: str) -> tuple[str, str]:
 
 
 def add_law_arguments(parser: CommandParser) -> None:
-    """Describe what says the laws of the joint."""
+    """Describe the options for the laws of the joint."""
     parser.option(
         "--law DOF=LAW",
-        f"law of a joint DOF, once for each: y=standard-linear-solid, theta=rigid; {', '.join(LAW_WORDS)}, a spring "
-        "with --damping (auto: viscous); no values are needed",
+        f"law of a joint DOF, once for each DOF: y=standard-linear-solid, theta=rigid; one of {', '.join(LAW_WORDS)}; "
+        "a spring takes the damping of --damping (auto: viscous)",
         _law,
         repeated=True,
     )
-    parser.option("--joint FILE", "joint of laws in a TOML file, with values where the fit may start", Path)
+    parser.option("--joint FILE", "TOML file of a joint of laws, with initial values", Path)
 
 
 def joint_of_laws(args: argparse.Namespace, dofs: Sequence[str]) -> LawJoint | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import re
 import warnings
-from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
@@ -52,52 +51,68 @@ class _Test(NamedTuple):
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Stiffness and loss factor of a joint over the amplitude of its motion: one file a level, each fitted with "
-        "the models of assembly.toml or, as by identify, to FRFs at the joint; or the backbone of a mode. Laws over "
-        "amplitude are fitted to all."
+        "Find stiffness and loss factor of a joint over the amplitude of its relative motion. The data are one file of "
+        "FRFs for each level, fitted with the models of assembly.toml or (as by identify) at the joint, or the "
+        "backbone of a mode. Laws over amplitude are fitted to all levels."
     )
+    parser.requires("FILE", "--level", "--model")
+    parser.requires("FILE", "--level", "--j", "--k", "--dofs")
+    parser.requires("--table", "--model")
+    parser.requires("--backbone", "--channel", "--model")
+    parser.examples += [
+        "jointfrf levels --table cases/iwan-beam/tests.csv --model cases/iwan-beam/assembly.toml --held B/25:y",
+        "jointfrf levels --backbone cases/iwan-beam/backbone.csv --model cases/iwan-beam/assembly.toml --channel A/1:y",
+    ]
     parser.add_argument("files", type=Path, nargs="*", metavar="FILE", help="measured FRFs, one file for each level")
-    parser.option("--model FILE", "assembly.toml, as for identify; without it FRFs at the joint (--j, --k)", Path)
+    parser.option(
+        "--model FILE", "assembly.toml, as for identify; without it the FRFs are at the joint (--j, --k)", Path
+    )
     parser.option(
         "--table FILE",
-        "instead of files: a table (CSV) with columns file and level, perhaps label; files beside it",
+        "CSV table of the tests instead of FILE: columns file (relative to the table), level, optionally label",
         Path,
     )
-    parser.heading("what was held in each test")
+    parser.heading("the controlled quantity of each test")
     parser.option(
         "--held WHAT",
-        "what had its level on all lines: force (default), a response as the models name it (B/25:y; without models as "
+        "quantity that had its level on all lines: force, a response as the models name it (B/25:y; without models as "
         "the file does, 101:+y), or joint:DOF for the relative motion of a joint DOF (joint:theta_z)",
         default="force",
     )
     parser.option(
-        "--level LEVEL,...", "level of each file, peak value: N; of a response by --motion; m or rad", _numbers
-    )
+        "--level LEVEL,...", "peak level of each file: N for a force, by --motion for a response, m or rad for a joint",
+        _numbers,
+    )  # fmt: skip
     parser.option(
-        "--motion", "what the level of a response is: m, m/s or m/s^2", get_args(MotionQuantity), "displacement"
+        "--motion", "quantity of the level of a response: m, m/s or m/s^2", get_args(MotionQuantity), "displacement"
     )
     parser.heading("the backbone of a mode, instead of files")
     parser.option(
         "--backbone FILE",
-        "a table (CSV) with columns frequency (Hz), amplitude (peak, by --motion) and damping (ratio) or, of tests at "
-        "phase resonance, force (peak, N); perhaps label",
+        "CSV table with columns frequency (Hz), amplitude (peak, by --motion) and damping (ratio) or, for tests at "
+        "phase resonance, force (peak, N); optionally label",
         Path,
     )
-    parser.option("--channel DOF", "where the amplitude was measured, and the force acts, as the models name it: A/1:y")
-    parser.option("--dof DOF", "DOF of the joint that is found, where more than one has a law")
-    parser.option("--errors FREQUENCY,DAMPING", "relative standard errors (0.001,0.05); damping: or of force", _numbers)
+    parser.option("--channel DOF", "DOF of the measured amplitude and of the force, as the models name it: A/1:y")
+    parser.option("--dof DOF", "joint DOF to be found, if several have a law")
+    parser.option(
+        "--errors FREQUENCY,DAMPING", "relative standard errors of frequency and of damping or force", _numbers,
+        [0.001, 0.05],
+    )  # fmt: skip
     parser.heading("the fits")
-    parser.option("--noise LEVEL", "relative noise of the FRFs, 0.01 for 1 %% (default: from them)", float)
-    parser.option("--laws NAME,...", f"laws over amplitude that are fitted: {', '.join(AMPLITUDE_LAWS)} (all)", _laws)
+    parser.option(
+        "--noise LEVEL", "relative noise of the FRFs; 0.01 means 1 %%", float, otherwise="estimated from the FRFs"
+    )
+    parser.option("--laws NAME,...", "laws over amplitude to be fitted", _laws, list(AMPLITUDE_LAWS))
     add_joint_arguments(parser)
     parser.set_defaults(points=None)  # one joint point
     parser.heading("results")
-    parser.option("--report FILE", "write a page (HTML) with figures of stiffness and loss factor over amplitude", Path)
-    parser.option("--output FILE", "write the result as a table (CSV)", Path)
+    parser.option("--report FILE", "HTML page with figures of stiffness and loss factor over amplitude", Path)
+    parser.option("--output FILE", "CSV table of the result", Path)
     parser.option(
         "--joints DIR",
-        "write the joint of each level, springs of its secant stiffness and damping, as DIR/LABEL.toml: export writes "
-        "cards of it, couple takes it",
+        "folder for the joint of each level, springs of its secant stiffness and damping, as LABEL.toml for export and "
+        "couple",
         Path,
     )
 
@@ -167,12 +182,8 @@ def _of_fits(args: argparse.Namespace) -> tuple[JointLevels, dict[str, Any]]:
         warnings.simplefilter("ignore", ConvergenceWarning)
         fits = [_fit(args, *each) for each in zip(tests, drives, strict=True)]
         with waiting("motion of the joint"):
-            found = levels(*zip(*fits, strict=True), labels=[one.label for one in tests], laws=_chosen(args))
+            found = levels(*zip(*fits, strict=True), labels=[one.label for one in tests], laws=args.laws)
     return found, {"sources": [str(one.path) for one in tests], "drives": [asdict(one) for one in drives]}
-
-
-def _chosen(args: argparse.Namespace) -> Sequence[str]:
-    return AMPLITUDE_LAWS if args.laws is None else args.laws
 
 
 def _of_backbone(args: argparse.Namespace) -> tuple[JointLevels, dict[str, Any]]:
@@ -187,7 +198,7 @@ def _of_backbone(args: argparse.Namespace) -> tuple[JointLevels, dict[str, Any]]
     parts = file.parts(lines)
     file, _ = file.located(parts)
     whole = file.assembly(lines, parts, [backbone.channel])
-    found = backbone_levels(whole, backbone, dof=args.dof, laws=_chosen(args))
+    found = backbone_levels(whole, backbone, dof=args.dof, laws=args.laws)
     return found, {"sources": [str(args.backbone)]}
 
 
@@ -213,16 +224,15 @@ def _backbone(args: argparse.Namespace) -> Backbone:
             columns.setdefault(name, []).append(cell)
     if not columns:
         raise FileContentError(f"{path}: has no rows")
-    errors = args.errors or [0.001, 0.05]
-    if len(errors) != 2:
-        raise UsageError("--errors takes two numbers, of frequency and of damping")
+    if len(args.errors) != 2:
+        raise UsageError(f"--errors has {len(args.errors)} numbers; give two, of frequency and of damping")
     freq, amplitude, other = (np.array([table.number(cell) for cell in columns[name]]) for name in names)
     with np.errstate(all="ignore"):  # a frequency of zero is an error below
         amplitude = amplitude / (2 * np.pi * freq) ** get_args(MotionQuantity).index(args.motion)
     try:
         return Backbone(
-            args.channel, freq, amplitude, **{second: other}, freq_error=errors[0],
-            damping_error=errors[1], labels=tuple(columns.get(_LABEL, ())),
+            args.channel, freq, amplitude, **{second: other}, freq_error=args.errors[0],
+            damping_error=args.errors[1], labels=tuple(columns.get(_LABEL, ())),
         )  # fmt: skip
     except ValueError as error:
         raise FileContentError(f"{path}: {error}") from error

@@ -88,7 +88,8 @@ def _run(words: list[str], stop_if_interrupted: Callable[[], None]) -> int:
     with warnings.catch_warnings(), _limited(args.limit_gb):
         warnings.simplefilter("always", OptionWarning)
         warnings.showwarning = show
-        status: int = args.action(with_configuration(args, parser, name))
+        parser.check_required(with_configuration(args, parser, name))
+        status: int = args.action(args)
         return status
 
 

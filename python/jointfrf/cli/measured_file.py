@@ -165,13 +165,13 @@ def add_file_arguments(parser: CommandParser) -> None:
         nargs="+",
         type=Path,
         metavar="FILE",
-        help=f"FRFs of the points around the joint: {format_names()}; several files of one test become one",
+        help=f"FRFs of the points around the joint: {format_names()}; several files of one test are merged",
     )
     add_joint_arguments(parser)
     parser.option(
         "--points NAMES",
-        "several joint points at once, bolt1,bolt2: one node of --j and of --k for each, with all of --dofs in the "
-        "file; DOFs are then bolt1.x, ...",
+        "names of several joint points, bolt1,bolt2: one node of --j and of --k for each, with all of --dofs in the "
+        "file; the DOFs are named bolt1.x, ...",
         words,
     )
 
@@ -180,43 +180,43 @@ def add_joint_arguments(parser: CommandParser) -> None:
     """Describe the points on both sides, the DOFs, the bands, the quantity: what belongs to a project."""
     parser.heading("the joint in the file")
     parser.option("--j NODES", "nodes on side j: 102,104 or 101:116", nodes)
-    parser.option("--k NODES", "nodes on side k; without --at in the same order", nodes)
+    parser.option("--k NODES", "nodes on side k; without --at in the order of --j", nodes)
     parser.option(
-        "--dofs DOFS", "joint DOFs out of x,y,z,theta_x,theta_y,theta_z (or rx,ry,rz), like y,theta_x", joint_dofs
+        "--dofs DOFS", "joint DOFs out of x,y,z,theta_x,theta_y,theta_z (or rx,ry,rz), such as y,theta_x", joint_dofs
     )
     parser.option(
         "--at X,Y,Z",
-        "reference point of the joint in m: its DOFs are then those of virtual points there, from all channels of "
-        "the nodes; without it, the nodes of each side lie along a line",
+        "reference point of the joint in m: its DOFs are the DOFs of virtual points there, from all channels of the "
+        "nodes; without it, the nodes of each side lie along a line",
         point,
     )
-    parser.option("--at-k X,Y,Z", "reference point of side k, where it is another one", point)
+    parser.option("--at-k X,Y,Z", "reference point of side k in m", point, otherwise="the point of --at")
     parser.option(
         "--channels TABLE",
-        "TOML or CSV table of sensors and impacts: side, position, direction; where the file of FRFs lacks them "
-        "(needs --at)",
+        "TOML or CSV table of sensors and impacts (side, position, direction), if the file of FRFs lacks them; needs "
+        "--at",
         Path,
     )
     parser.option(
         "--spacing METRES",
-        "distance between neighbouring nodes along a line, where the file has no coordinates; needs --axis",
+        "distance between neighbouring nodes along a line, if the file has no coordinates; needs --axis",
         float,
     )
-    parser.option("--axis", "direction of the line of nodes, with --spacing", ("x", "y", "z"))
+    parser.option("--axis", "direction of the line of nodes; needs --spacing", ("x", "y", "z"))
     parser.option("--band LOW:HIGH", "frequency band in Hz; may be repeated", parse_band, repeated=True)
     add_reading_arguments(parser)
 
 
 def add_reading_arguments(parser: CommandParser) -> None:
-    """Describe the options that say what the FRFs of files are, and where they stand in them."""
+    """Describe the options that state the quantity of the FRFs and their place in files."""
     parser.option(
-        "--quantity", "what the FRFs are, where the file does not say", ("receptance", "mobility", "accelerance")
+        "--quantity", "quantity of the FRFs, if the file does not state it", ("receptance", "mobility", "accelerance")
     )
-    parser.option("--force-quantity", "take --quantity also where the file says something else")
+    parser.option("--force-quantity", "use --quantity even if the file states another quantity")
     parser.option(
         "--map FIELD=NAME",
-        f"which field of a MATLAB, NPZ or HDF5 file is what: {', '.join(_FIELDS)}; responses and excitations also as "
-        "names (responses=1:x,2:x), axes as freq,out,in in their order; may be repeated",
+        f"name of a field in a MATLAB, NPZ or HDF5 file: {', '.join(_FIELDS)}; responses and excitations also as names "
+        "(responses=1:x,2:x), axes as freq,out,in in their order; may be repeated",
         _field,
         repeated=True,
     )

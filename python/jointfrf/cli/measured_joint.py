@@ -24,7 +24,7 @@ from jointfrf.channels.joint_channels import (
 )
 from jointfrf.channels.point_lines import Interface, interface
 from jointfrf.cli.measured_file import Nodes, file_names, in_some_band, shown_nodes
-from jointfrf.cli.usage import UsageError
+from jointfrf.cli.usage import UsageError, listed
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import Channel, ChannelPlace, JointSide, places_of_nodes
@@ -318,8 +318,7 @@ def _check_options(args: argparse.Namespace, frfs: FrfSet, table: object) -> Non
         what = "; ".join(needs[name][1] for name in missing)
         verb = "is" if len(missing) == 1 else "are"
         nodes = "" if missing == ["--dofs"] else f" ({file_names(args)} has nodes {known})"
-        names = ", ".join([*missing[:-2], " and ".join(missing[-2:])])
-        raise UsageError(f"{names} {verb} missing: {what}{nodes}")
+        raise UsageError(f"{listed(missing)} {verb} missing: {what}{nodes}")
     if args.points is not None:
         for name, value in (("--at", args.at), ("--spacing", args.spacing), ("a table of channels", table)):
             if value is not None:

@@ -44,43 +44,58 @@ _OF_PARTS = (
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Plan a test of an assembly whose parts are known: which sensors and hits show the joint best, what they will "
-        "know of each parameter, what the next one would add, and where in frequency the knowledge lies."
+        "Plan a test of an assembly of parts with models: the sensors and impacts that determine the joint best, the "
+        "expected error of each parameter, the gain of one more sensor or impact, and the information by frequency."
     )
+    parser.requires("--band", "--step")
+    parser.examples += [
+        "jointfrf plan cases/lap-beam/assembly.toml --band 20:1000 --step 2 --noise 0.02 --floor 0.01 --budget 5",
+        "jointfrf plan cases/3.3-beams-1mm/case.toml --band 10:500 --step 1 --spacings 0.001,0.005,0.02",
+    ]
     parser.add_argument(
-        "model", type=Path, metavar="ASSEMBLY", help="assembly.toml with the joint that is expected, or case.toml"
+        "model", type=Path, metavar="ASSEMBLY", help="assembly.toml with the expected joint, or case.toml"
     )
     add_line_arguments(parser)
     parser.option(
-        "--sensors DOF,...", "places where a sensor could be: A/7:y,B/@0.1,0,0:y; by default of all nodes", _dofs
+        "--sensors DOF,...",
+        "possible places of sensors: A/7:y,B/@0.1,0,0:y",
+        _dofs,
+        otherwise="translations of --candidates nodes",
     )
-    parser.option("--hits DOF,...", "places that could be hit or shaken; by default as for sensors", _dofs)
-    parser.option("--keep-sensors DOF,...", "sensors that are there in any case", _dofs)
-    parser.option("--keep-hits DOF,...", "hits that are made in any case", _dofs)
-    parser.option("--candidates N", "nodes of each part that are looked at, far from each other", int, _CANDIDATES)
+    parser.option("--hits DOF,...", "possible places of impacts or shakers", _dofs, otherwise="as for --sensors")
+    parser.option("--keep-sensors DOF,...", "sensors that are in every plan", _dofs)
+    parser.option("--keep-hits DOF,...", "impacts that are in every plan", _dofs)
+    parser.option("--candidates N", "number of nodes of each part, far from each other", int, _CANDIDATES)
     parser.heading("noise and sensors")
-    parser.option("--noise LEVEL", "standard deviation of an average relative to the FRF", _positive, 0.01)
-    parser.option("--floor LEVEL", "the same of the accelerance that does not depend on the FRF, m/(s^2 N)", _positive)
-    parser.option("--averages N", "averages of each FRF", _positive, 1.0)
+    parser.option("--noise LEVEL", "relative noise of one average of the FRFs; 0.01 means 1 %%", _positive, 0.01)
+    parser.option("--floor LEVEL", "noise floor of the accelerances, independent of the FRF, m/(s^2 N)", _positive)
+    parser.option("--averages N", "number of averages of each FRF", _positive, 1.0)
     parser.option(
-        "--sensor-mass KG", "mass of each sensor that the models do not have: what it moves is shown", _positive
+        "--sensor-mass KG", "mass of each sensor, if the models lack it: prints the change of the parameters", _positive
     )
     parser.option(
         "--spacings M,...",
-        "of a case.toml: what rotations by finite differences over these spacings move: 0.001,0.005", _spacings,
+        "spacings of finite differences for rotations, m, with case.toml: prints the change of the parameters: "
+        "0.001,0.005", _spacings,
     )  # fmt: skip
-    parser.heading("what is wanted")
-    parser.option("--targets NAME,...", "parameters to be found: k_y,c_y; all of the joint by default", _dofs)
+    parser.heading("the goal")
+    parser.option("--targets NAME,...", "parameters to be found: k_y,c_y", _dofs, otherwise="all of the joint")
     parser.option(
-        "--criterion NAME", "A: mean of squared relative errors, D: volume of their ellipsoid", ("A", "D"), "A"
+        "--criterion", "A: mean of the squared relative errors, D: volume of their ellipsoid", ("A", "D"), "A"
     )
     parser.option("--within ERROR", "relative error at which the plan ends: 0.02", _positive)
-    parser.option("--budget COST", "what sensors and hits may cost together", _positive)
-    parser.option("--sensor-price COST", "of one sensor", _positive, 1.0)
-    parser.option("--hit-price COST", "of one hit", _positive, 1.0)
-    parser.option("--spread S", "relative spread of assemblies: how many must be tested, with --next", _positive)
-    parser.option("--next WIDTH", "half width wanted of the interval of the next assembly, relative: 0.3", _positive)
-    parser.option("--report FILE", "write a page (HTML) with sensors, hits and where the knowledge lies", Path)
+    parser.option("--budget COST", "largest total price of sensors and impacts", _positive)
+    parser.option("--sensor-price COST", "price of one sensor", _positive, 1.0)
+    parser.option("--hit-price COST", "price of one impact", _positive, 1.0)
+    parser.option(
+        "--spread S", "relative spread between assemblies: prints the number of assemblies to test; needs --next",
+        _positive,
+    )  # fmt: skip
+    parser.option(
+        "--next WIDTH", "relative half width of the prediction interval of the next assembly: 0.3; needs --spread",
+        _positive,
+    )  # fmt: skip
+    parser.option("--report FILE", "HTML page with sensors, impacts and the information by frequency", Path)
 
 
 def _positive(word: str) -> float:
@@ -119,8 +134,7 @@ def run(args: argparse.Namespace) -> int:
     if (args.spread is None) != (args.next is None):
         raise UsageError("--spread and --next belong together: --spread 0.1 --next 0.3")
     freq = lines_of(args)
-    if freq is None:
-        raise UsageError("--band LOW:HIGH and --step HZ are missing: the lines that will be measured")
+    assert freq is not None  # --step is required
     if args.model.is_dir() or args.model.name == _CASE:
         return _of_case(args, freq, out)
     warn_of_ignored(args, ("--spacings",), "a test with models takes translations as they are")

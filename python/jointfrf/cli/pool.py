@@ -31,35 +31,48 @@ def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         "Pool fits of the same joint in several assemblies, at several torques, on several days: mean, spread between "
-        "assemblies, which factor matters, who does not belong to the others, and the interval of the next assembly."
+        "assemblies, significant factors, outlying assemblies, and the prediction interval of the next assembly."
     )
+    parser.requires("FIT")
+    parser.requires("--table")
+    parser.examples += [
+        "jointfrf pool --table cases/bolted-round-robin/tests.csv --trend torque",
+        "jointfrf pool cases/bolted-round-robin/assembly_1_10_Nm.json cases/bolted-round-robin/assembly_1_15_Nm.json "
+        "cases/bolted-round-robin/assembly_2_10_Nm.json --factor assembly=1,1,2",
+    ]
     parser.add_argument("files", type=Path, nargs="*", metavar="FIT", help="JSON files of identify --save")
     parser.option(
         "--table FILE",
-        "instead of files: a table (CSV) with a column file, perhaps label, and one for each factor; files beside it",
+        "CSV table of the fits instead of FIT: columns file (relative to the table), optionally label, and one column "
+        "for each factor",
         Path,
     )
     parser.option(
         "--factor NAME=GROUP,...",
-        "the group of each file: assembly=1,1,2,2 (files of one assembly are repeats), day=mon,mon,tue,tue",
+        "group of each file: assembly=1,1,2,2 (files of one assembly are repeats), day=mon,mon,tue; may be repeated",
         _factor,
         repeated=True,
     )
+    parser.option("--trend NAME", "numeric factor with a power law: torque; may be repeated", str, repeated=True)
     parser.option(
-        "--trend NAME", "a factor whose numbers act by themselves, as a power law: torque", str, repeated=True
-    )
-    parser.option(
-        "--common ERROR", "relative standard error that all files share (0.01), or files of a group (day=0.01)",
+        "--common ERROR",
+        "relative standard error that all files share (0.01), or all files of a group (day=0.01); may be repeated",
         _common, repeated=True,
     )  # fmt: skip
-    parser.option("--parameters NAME,...", "parameters to be pooled, loss factors (eta_y) included", _names)
-    parser.option("--probability P", "of the intervals", _probability, 0.95)
-    parser.option("--transfer", "test instead whether one joint explains all files, each of another structure")
     parser.option(
-        "--spread S", "with --transfer: relative spread between assemblies that is no difference", _share, 0.0
+        "--parameters NAME,...", "parameters to be pooled, or loss factors (eta_y)", _names,
+        otherwise="all that the fits share",
+    )  # fmt: skip
+    parser.option("--probability P", "coverage probability of the intervals", _probability, 0.95)
+    parser.option(
+        "--transfer", "test whether one joint explains all files, each of another structure, instead of pooling"
     )
-    parser.option("--report FILE", "write a page (HTML) with a forest plot of each parameter", Path)
-    parser.option("--output FILE", "write the result as a table (CSV)", Path)
+    parser.option(
+        "--spread S", "relative spread between assemblies that is no significant difference; needs --transfer", _share,
+        0.0,
+    )  # fmt: skip
+    parser.option("--report FILE", "HTML page with a forest plot of each parameter", Path)
+    parser.option("--output FILE", "CSV table of the result", Path)
 
 
 def _names(word: str) -> list[str]:

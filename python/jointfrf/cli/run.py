@@ -30,11 +30,12 @@ _TOGETHER = 3
 
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
-    parser.description = "Run cases by name, number or folder; without any, all that come with jointfrf."
+    parser.description = "Run cases by name, number or folder; without any, all cases that come with jointfrf."
+    parser.examples.append("jointfrf run 3.1 --realisations 20 --out results")
     parser.add_argument("cases", nargs="*", metavar="CASE", help="name, number, or folder with a case.toml")
-    parser.option("--out DIR", "where results go (results)", Path, Path("results"))
-    parser.option("--realisations N", "instead of the number the case names", positive)
-    parser.option("--jobs N", "processes (all cores)", positive, available_cores())
+    parser.option("--out DIR", "folder for the results", Path, Path("results"))
+    parser.option("--realisations N", "number of realisations", positive, otherwise="the number in the case")
+    parser.option("--jobs N", "number of processes", positive, available_cores(), otherwise="all cores")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -31,37 +31,43 @@ _EXECUTORS = ("processes", "threads", "loky", "mpi", "dask:ADDRESS")
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Estimate the joint of a case from many realisations of the noise, over a design of factors. What is finished "
-        "is kept in the folder: the same command goes on where it was stopped. `jointfrf study merge PART... --out "
-        "DIR` puts parts together."
+        "Estimate the joint of a case from many realisations of the noise, over a design of factors. Finished "
+        "realisations are kept in the folder: the same command continues an interrupted study. `jointfrf study merge "
+        "PART... --out DIR` merges parts."
     )
+    parser.usage = "jointfrf study CASE [options]\n       jointfrf study merge PART [PART ...] --out DIR [options]"
+    parser.examples.append("jointfrf study 3.1 --realisations 20 --factor noise=0.01,0.03 --out study")
     parser.add_argument(
         "words",
         nargs="+",
         metavar="CASE | merge PART...",
-        help="name, number, or folder with a case.toml; or merge and folders of parts",
+        help="name, number, or folder with a case.toml; or merge and the folders of parts",
     )
-    parser.option("--realisations N", "instead of the number the case names", _whole)
+    parser.option("--realisations N", "number of realisations", _whole, otherwise="the number in the case")
     parser.option(
         "--factor NAME=V,V,...",
-        "vary noise, spacing, lines, stiffness, damping, or a key of case.toml such as "
-        "frequency.last or joint.stiffness; a * before = multiplies; may be repeated",
+        "values of noise, spacing, lines, stiffness, damping, or of a key of case.toml such as frequency.last or "
+        "joint.stiffness; a * before = multiplies; may be repeated",
         default=[],
         repeated=True,
     )
-    every = "every combination of values, or one factor at a time (full)"
+    every = "full: every combination of values; one-at-a-time: one factor at a time"
     parser.option("--arrangement", every, get_args(Arrangement), "full")
-    own = "a method instead of those that the case names; may be repeated"
-    parser.option("--estimator WORD", own, default=[], repeated=True)
-    parser.option("--noise NAME", "a noise of the case, instead of all; may be repeated", default=[], repeated=True)
-    parser.option("--first N", "compute realisations from this one on, a part only", _whole)
-    parser.option("--count N", "how many of them", positive)
-    parser.option("--jobs N", "workers (all cores)", positive)
-    what = f"what the workers are: {', '.join(_EXECUTORS)} (processes)"
-    parser.option("--executor WORD", what, _executor, "processes")
-    parser.option("--out DIR", "where results go (studies/NAME of the case)", Path)
-    single = "write single realisations, too: parquet or npz"
-    parser.option("--values FORMAT", single, _format, [], repeated=True)
+    parser.option(
+        "--estimator WORD", "method of identification; may be repeated", default=[], repeated=True,
+        otherwise="the methods in the case",
+    )  # fmt: skip
+    parser.option(
+        "--noise NAME", "noise of the case; may be repeated", default=[], repeated=True, otherwise="all in the case"
+    )
+    parser.option("--first N", "first realisation of a part of the study; needs --count", _whole)
+    parser.option("--count N", "number of realisations of a part; needs --first", positive)
+    parser.option("--jobs N", "number of workers", positive, otherwise="all cores")
+    parser.option("--executor WORD", f"kind of workers: {', '.join(_EXECUTORS)}", _executor, "processes")
+    parser.option("--out DIR", "folder for the results", Path, otherwise="studies/NAME of the case")
+    parser.option(
+        "--values FORMAT", "file of single realisations: parquet or npz; may be repeated", _format, [], repeated=True
+    )
 
 
 def _whole(word: str) -> int:

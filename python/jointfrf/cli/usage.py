@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ __all__ = [
     "check_out",
     "complain",
     "in_options",
+    "listed",
     "plain",
     "positive",
     "progress",
@@ -78,12 +79,17 @@ def in_options(text: str) -> str:
     return text
 
 
+def listed(names: Sequence[str]) -> str:
+    """Return names as a sentence lists them: a, b and c."""
+    return ", ".join([*names[:-2], " and ".join(names[-2:])])
+
+
 def warn_of_ignored(args: argparse.Namespace, names: Iterable[str], why: str) -> None:
     """Warn of options that were given and have no effect."""
     found = [name for name in names if name.removeprefix("--").replace("-", "_") in args.given]
     if found:
         verb = "have" if found[1:] else "has"
-        warnings.warn(f"{' and '.join(found)} {verb} no effect: {why}", OptionWarning, stacklevel=2)
+        warnings.warn(f"{listed(found)} {verb} no effect: {why}", OptionWarning, stacklevel=2)
 
 
 class Output:

@@ -345,7 +345,7 @@ def test_a_joint_is_transferred_to_another_part(tmp_path):
 @pytest.mark.parametrize(
     ("words", "status", "error"),
     [
-        (VALIDATE[:4], 2, "--joint is missing"),
+        (VALIDATE[:4], 2, "--joint, --j and --k are missing"),
         (["validate", "a.toml", "b.uff", "c.npz", *COUPLE[3:-1], "300"], 0, ""),
         ([*VALIDATE, "--band", "1000:2000"], 1, "no frequency line"),
         ([*VALIDATE, "--output", "none/x.npz"], 2, "there is no folder none"),

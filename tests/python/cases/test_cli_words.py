@@ -42,7 +42,7 @@ def _elsewhere(tmp_path, monkeypatch):
         (["nothing"], "there is no command 'nothing': jointfrf --help lists them"),
         (["identify", "a.uff", "--dof", "y"], "unknown option --dof; did you mean --dofs?"),
         (["identify", "a.uff", "--qiet"], "unknown option --qiet; did you mean --quiet?"),
-        (["identify", "a.uff", "--damping=viscos"], "'viscos' is none of none, viscous, hysteretic, both, auto"),
+        (["identify", "a.uff", "--damping=viscos"], "unknown value 'viscos'; use one of none, viscous"),
         (["identify", "a.uff", "--damping", "viscos"], "did you mean viscous?"),
         (["identify", "a.uff", "--method", "complience"], "did you mean compliance?"),
         (["check", "a.uff", "--dofs", "thetax,tz"], "not 'tz'"),
@@ -53,7 +53,7 @@ def _elsewhere(tmp_path, monkeypatch):
         (["check", "a.uff", "--force-quantity"], "--force-quantity needs --quantity"),
         (["completion", "bsh"], "did you mean bash?"),
         (["cases", "--key"], "did you mean --keys?"),
-        ([], "identify a joint from a file of measured FRFs"),
+        ([], "identify a joint from measured FRFs"),
         (["--hlep"], "unknown option --hlep; did you mean --help?"),
     ],
 )
@@ -260,7 +260,7 @@ def test_what_cannot_be_done_is_said_before_a_file_is_read(tmp_path, words, mess
         ("jinja2", ["study", "no"]),
         ("pyarrow", ["study", "no", "--values", "parquet"]),
         ("pyarrow", ["study", "merge", "a", "b", "--out", "c", "--values", "parquet"]),
-        ("jinja2", ["plan", "no.toml", "--report", "p.html"]),
+        ("jinja2", ["plan", "no.toml", "--band", "1:2", "--step", "1", "--report", "p.html"]),
         ("jinja2", ["pool", "no.json", "--report", "p.html"]),
         ("h5py", ["convert", "no.uff", "a.h5"]),
         ("h5py", ["frf", "no.toml", "--output", "a.h5"]),
@@ -483,7 +483,7 @@ def test_the_command_line_wins(tmp_path):
         ("quantity", "quantitty", "did you mean 'quantity'?"),
         ("[identify]", "[identfy]", "did you mean 'identify'?"),
         ("damping", "dampening", "[identify]: unknown key 'dampening'"),
-        ('"viscous"', '"viscos"', "[identify]: damping: 'viscos' is none of none, viscous"),
+        ('"viscous"', '"viscos"', "[identify]: damping: unknown value 'viscos'; use one of none, viscous"),
         ("[101, 102]", "[0]", "jointfrf.toml: j: '0' is no node number"),
         ('"y", "theta_z"', '"y", "theta_"', "dofs: dofs must be among"),
         ("[20, 100]", "[20]", "band: '20' is not a band like 200:550"),
@@ -563,7 +563,7 @@ def test_the_limit_of_what_is_read_is_an_option(tmp_path, monkeypatch):
     result = run_command("check", BARS, "--limit-gb", "1e-6")
     assert result.returncode == 1
     assert "more than the 1e-06 GB that are read: --limit-gb or the environment" in result.stderr
-    assert "must be a number of GB above 0, not '0'" in run_command("check", BARS, "--limit-gb", "0").stderr
+    assert "'0' is not a number above 0; use a size in GB" in run_command("check", BARS, "--limit-gb", "0").stderr
     assert main(["check", str(BARS), "--limit-gb", "1e-6", "--quiet"]) == 1
     assert "JOINTFRF_FILE_LIMIT_GB" not in os.environ
 
