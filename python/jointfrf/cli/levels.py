@@ -20,7 +20,16 @@ from jointfrf.assembly_file.read import read_assembly_file
 from jointfrf.cli.measured_file import READING, add_joint_arguments, read_receptances, words
 from jointfrf.cli.measured_joint import measured_joint
 from jointfrf.cli.parser import CommandParser, one_of
-from jointfrf.cli.usage import Output, UsageError, check_folder, check_out, waiting, warn_of_ignored
+from jointfrf.cli.usage import (
+    Failures,
+    Interrupt,
+    Output,
+    UsageError,
+    check_folder,
+    check_out,
+    waiting,
+    warn_of_ignored,
+)
 from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
 from jointfrf.extras import check_extras
 from jointfrf.files import write_file
@@ -142,8 +151,11 @@ def run(args: argparse.Namespace) -> int:
         check_extras("matplotlib")
     if args.joints is not None:
         check_out("--joints", args.joints)
-    out = Output(args)
-    found, about = _of_fits(args) if args.backbone is None else _of_backbone(args)
+    out, failures, interrupt = Output(args), Failures(args), Interrupt()
+    if args.backbone is None:
+        found, about = _of_fits(args, failures, interrupt)
+    else:
+        found, about = _of_backbone(args)
     written = []
     if args.report is not None:
         written.append(write_levels(found, args.report, command=args.typed))
@@ -155,8 +167,11 @@ def run(args: argparse.Namespace) -> int:
     out.say(found, *([""] if written else []), *(f"wrote {path}" for path in written))
     out.warn(*found.warnings)
     by_dof = {dof: [_by_name(one) for one in own] for dof, own in found.levels.items()}
-    out.give(about | asdict(replace(found, joints={})) | {"levels": by_dof, "written": [str(path) for path in written]})
-    return 1 if found.refused else 0
+    content = {"levels": by_dof, "failed": failures.found, "written": [str(path) for path in written]}
+    out.give(about | asdict(replace(found, joints={})) | content)
+    failures.complain()
+    interrupt.resume()
+    return 1 if found.refused or failures.found else 0
 
 
 def _write_joints(found: JointLevels, folder: Path) -> list[Path]:
@@ -172,18 +187,24 @@ def _by_name(one: JointLevel) -> dict[str, Any]:
     return asdict(one) | {"stiffness": one.stiffness._asdict(), "loss_factor": one.loss_factor._asdict()}
 
 
-def _of_fits(args: argparse.Namespace) -> tuple[JointLevels, dict[str, Any]]:
-    """Return the levels of files, and what they were."""
+def _of_fits(args: argparse.Namespace, failures: Failures, interrupt: Interrupt) -> tuple[JointLevels, dict[str, Any]]:
+    """Return the levels of files, and the tests they are from."""
     warn_of_ignored(args, ("--channel", "--dof", "--errors"), "there is no --backbone")
-    tests = _tests(args)
-    drives = [_drive(args, one) for one in tests]
+    tests, fits = _tests(args), dict[_Test, tuple[Fit, Drive]]()
+    drives = {one: _drive(args, one) for one in tests}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they are among the findings
         warnings.simplefilter("ignore", ConvergenceWarning)
-        fits = [_fit(args, *each) for each in zip(tests, drives, strict=True)]
+        with waiting("tests") as count, interrupt.kept_back(fits):
+            for done, test in enumerate(tests):
+                count(done, len(tests))
+                with failures.noted(str(test.path)):
+                    fits[test] = _fit(args, test, drives[test])
+        if not fits:
+            raise FileContentError("; ".join(failures.found.values()))
         with waiting("motion of the joint"):
-            found = levels(*zip(*fits, strict=True), labels=[one.label for one in tests], laws=args.laws)
-    return found, {"sources": [str(one.path) for one in tests], "drives": [asdict(one) for one in drives]}
+            found = levels(*zip(*fits.values(), strict=True), labels=[one.label for one in fits], laws=args.laws)
+    return found, {"sources": [str(one.path) for one in fits], "drives": [asdict(drives[one]) for one in fits]}
 
 
 def _of_backbone(args: argparse.Namespace) -> tuple[JointLevels, dict[str, Any]]:
@@ -290,7 +311,8 @@ def _drive(args: argparse.Namespace, test: _Test) -> Drive:
 def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Drive]:
     """Return the fit of a test, and what was held by the names of the fit."""
     own = argparse.Namespace(**vars(args) | {"files": [test.path]})
-    frfs = read_receptances(own)
+    with waiting(f"reading {test.path.name}"):
+        frfs = read_receptances(own)
     if args.model is not None:
         measured = measured_assembly(args.model, frfs, bands=args.band)
         with waiting(f"fit of {test.path.name}"):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_folder, warn_of_ignored
+from jointfrf.cli.usage import Failures, Output, UsageError, check_folder, warn_of_ignored
 from jointfrf.errors import FileContentError
 from jointfrf.extras import check_extras
 from jointfrf.files import write_file
@@ -25,6 +25,8 @@ __all__ = ["add_arguments", "run"]
 
 #: The column of a table of tests that names the saved fit; and one that gives it another name than the file's.
 _FILE, _LABEL = "file", "label"
+#: Fits that can be pooled or compared.
+_FEWEST = 2
 
 
 def add_arguments(parser: CommandParser) -> None:
@@ -120,16 +122,17 @@ def run(args: argparse.Namespace) -> int:
         check_folder(option, path)
     if args.report is not None:
         check_extras("jinja2")
-    files, labels, factors = _tests(args)
-    fits = [load(path) for path in files]
+    failures = Failures(args)
+    files, fits, labels, factors = _loaded(_tests(args), failures)
     sources = [str(path) for path in files]
     if args.transfer:
         of_pool = ("--factor", "--trend", "--common", "--probability", "--report", "--output")
         warn_of_ignored(args, of_pool, "it is of the pool, and --transfer only tests")
         compared = _transferred(args, fits, labels)
         out.say(compared)
-        out.give({"sources": sources, "transfer": asdict(compared)})
-        return 0
+        out.give({"sources": sources, "transfer": asdict(compared), "failed": failures.found})
+        failures.complain()
+        return 1 if failures.found else 0
     warn_of_ignored(args, ("--spread",), "it is of --transfer")
     pooled = _pooled(args, fits, labels, factors)
     written = []
@@ -140,8 +143,28 @@ def run(args: argparse.Namespace) -> int:
         written.append(args.output)
     out.say(pooled, *([""] if written else []), *(f"wrote {path}" for path in written))
     out.warn(*pooled.warnings)
-    out.give({"sources": sources, **asdict(pooled), "written": [str(path) for path in written]})
-    return 0
+    content = {"failed": failures.found, "written": [str(path) for path in written]}
+    out.give({"sources": sources, **asdict(pooled), **content})
+    failures.complain()
+    return 1 if failures.found else 0
+
+
+def _loaded(
+    tests: tuple[list[Path], list[str], dict[str, Sequence[str]]], failures: Failures
+) -> tuple[list[Path], list[Fit], list[str], dict[str, Sequence[str]]]:
+    """Return files that are saved fits, their fits, labels and factors."""
+    files, labels, factors = tests
+    for name, groups in factors.items():
+        if len(groups) != len(files):
+            raise UsageError(f"--factor {name} has {len(groups)} groups; give {len(files)}, one for each file")
+    fits = dict[int, Fit]()
+    for i, path in enumerate(files):
+        with failures.noted(str(path)):
+            fits[i] = load(path)
+    if len(fits) < _FEWEST and failures.found:
+        raise FileContentError("; ".join(failures.found.values()))
+    own: dict[str, Sequence[str]] = {name: [groups[i] for i in fits] for name, groups in factors.items()}
+    return [files[i] for i in fits], list(fits.values()), [labels[i] for i in fits], own
 
 
 def _tests(args: argparse.Namespace) -> tuple[list[Path], list[str], dict[str, Sequence[str]]]:

@@ -10,7 +10,7 @@ from typing import Any, get_args
 
 from jointfrf.cases.catalogue import UnknownCaseError
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_out, positive, progress, warn_of_ignored
+from jointfrf.cli.usage import Output, UsageError, check_out, positive, waiting, warn_of_ignored
 from jointfrf.extras import check_extras, import_extra
 from jointfrf.parallel.pool import AnyExecutor, available_cores, check_processes, safe_environment
 from jointfrf.studies.design import Arrangement, StudyDesign, parse_factor
@@ -125,7 +125,7 @@ def _studied(options: argparse.Namespace, is_part: bool) -> StudyResult:
         is_stated = factors or options.noise or options.estimator
         design = StudyDesign(factors, options.arrangement, options.noise, options.estimator) if is_stated else None
         name = Path(case).resolve().name if (Path(case) / "case.toml").is_file() else case
-        with _started(options.executor, options.jobs) as executor:
+        with _started(options.executor, options.jobs) as executor, waiting(name) as count:
             return study(
                 case,
                 options.out or Path("studies") / name,
@@ -134,7 +134,7 @@ def _studied(options: argparse.Namespace, is_part: bool) -> StudyResult:
                 part=_range(options) if is_part else None,
                 executor=executor,
                 jobs=options.jobs,
-                progress=progress(name),
+                progress=count,
             )
     except UnknownCaseError as error:
         raise UsageError(error) from error

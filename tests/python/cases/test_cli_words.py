@@ -9,10 +9,11 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
+import warnings
 import weakref
 from functools import partial
-from itertools import chain, repeat
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +21,10 @@ import pytest
 
 from command import run_command
 from jointfrf.__main__ import main as started
+from jointfrf.cli import usage
 from jointfrf.cli.main import main
 from jointfrf.cli.parser import COMMANDS, command_parser
+from jointfrf.errors import FrfCheckWarning
 from thinned_cases import DrawSome
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -207,31 +210,108 @@ def test_every_command_names_options_without_effect_also_in_json(words, warning)
     assert f"jointfrf: warning: {warning}" in run_command(*words, "--quiet").stderr
 
 
-@pytest.mark.usefixtures("_structures")
-def test_several_tests_of_models_say_the_time_left_and_their_warnings(monkeypatch, tmp_path):
-    from jointfrf.cli import identify_model
-
-    said = []
-    monkeypatch.setattr(identify_model, "waiting", lambda text: said.append(text) or contextlib.nullcontext())
-    monkeypatch.setattr(identify_model.time, "monotonic", chain([0.0, 0.0, 100.0], repeat(0.0)).__next__)
+@pytest.fixture
+def _models(_structures, tmp_path):
+    """The same with models of the chains, one of them wrong, and four tests, the third of them damaged."""
     wrong = CHAIN.replace("[2.0, 1.0, 3.0]", "[2.0, 1.1, 3.0]")  # which the residual shows
     (tmp_path / "assembly.toml").write_text(
         f'[A]\n{wrong.format(ground="start")}joint = ["3:x"]\nexact = true\n[B]\n{CHAIN.format(ground="end")}'
         'joint = ["1:x"]\nexact = true\n[joint]\ndofs = ["x"]\nstiffness = [9e4]\ndamping = [9.0]\n'
         '[channels]\n"2:+x" = "A/2:x"\n"102:+x" = "B/2:x"\n'
     )
-    assert run_command("convert", "c.npz", "d.npz").returncode == 0
-    words = ["identify", "c.npz", "d.npz", "--model", "assembly.toml", "--noise", "0.001", "--json"]
-    result = run_command(*words, "--each")
-    assert result.returncode == 0, result.stderr
-    content = json.loads(result.stdout)
+    for name in ("d", "e", "f"):
+        assert run_command("convert", "c.npz", f"{name}.npz").returncode == 0
+    (tmp_path / "e.npz").write_bytes((tmp_path / "e.npz").read_bytes()[:200])
+
+
+EACH = ["identify", "c.npz", "d.npz", "e.npz", "f.npz", "--model", "assembly.toml", "--noise", "0.001", "--each"]
+
+
+@pytest.mark.usefixtures("_models")
+def test_a_test_that_fails_ends_no_other_one():
+    result = run_command(*EACH, "--save", "fit.json")
+    assert result.returncode == 1
+    shown = [line for line in result.stdout.splitlines() if " of 4): " in line]
+    assert [line.partition(":")[0] for line in shown] == [f"{one} ({i} of 4)" for i, one in enumerate("cdef", 1)]
+    assert shown[0].partition(": ")[2].startswith("k_x ")
+    assert shown[2] == "e (3 of 4): failed"
+    last = result.stderr.splitlines()[-1]
+    assert last.startswith("jointfrf: error: e.npz")
+    assert last.count("e.npz") == 1
+    assert all(Path(f"fit_{one}.json").exists() == (one != "e") for one in "cdef")
+    content = json.loads(run_command(*EACH, "--json").stdout)
     own = [test["fits"][0]["warnings"] for test in content["tests"]]
     assert own[0]
-    named = [f"{name}: {text}" for name, texts in zip("cd", own, strict=True) for text in texts]
+    named = [f"{name}: {text}" for name, texts in zip("cdf", own, strict=True) for text in texts]
     assert [text for text in content["warnings"] if text in named] == named
-    assert said == ["fit of c.npz (1 of 2)", "fit of d.npz (2 of 2, about 2 min left)"]
-    alone = json.loads(run_command(*[word for word in words if word != "d.npz"]).stdout)
+    assert list(content["failed"]) == ["e.npz"]
+    alone = json.loads(run_command(*EACH[:2], *EACH[5:-1], "--json").stdout)
     assert set(own[0]) <= set(alone["warnings"])
+
+
+@pytest.mark.usefixtures("_models")
+@pytest.mark.parametrize("wrong", [AssertionError("no"), IndexError("no"), np.linalg.LinAlgError("no")])
+def test_any_error_of_a_test_is_named_at_the_end(monkeypatch, wrong):
+    from jointfrf.cli import identify_model
+
+    fit = identify_model._one
+    one = lambda args, out: fit(args, out) if args.files[0].name != "d.npz" else (_ for _ in ()).throw(wrong)  # noqa: E731
+    monkeypatch.setattr(identify_model, "_one", one)
+    result = run_command(*EACH[:3], *EACH[5:])
+    assert result.returncode == 1
+    name = "" if isinstance(wrong, ValueError) else f"{type(wrong).__name__}: "
+    assert result.stderr.splitlines()[-1] == f"jointfrf: error: d.npz: {name}no"
+    assert "c (1 of 2): k_x" in result.stdout
+
+
+@pytest.mark.usefixtures("_models")
+def test_an_interrupt_leaves_the_tests_that_are_finished(monkeypatch):
+    from jointfrf.cli import identify_model
+
+    fit = identify_model._one
+
+    def until_d(args, out):
+        if args.files[0].name == "d.npz":
+            raise KeyboardInterrupt
+        return fit(args, out)
+
+    monkeypatch.setattr(identify_model, "_one", until_d)
+    result = run_command(*EACH, "--out", "o")
+    assert (result.returncode, result.stderr.splitlines()[-1]) == (130, "jointfrf: error: interrupted")
+    assert Path("o/parameters.csv").read_text().splitlines()[1].startswith("c,k_x,")
+    assert "wrote o/parameters.csv" in result.stdout
+    result = run_command(*EACH[:1], "d.npz", *EACH[5:])  # nothing is finished
+    assert result == (130, "", "jointfrf: error: interrupted\n")
+
+
+@pytest.mark.usefixtures("_models")
+def test_levels_and_pool_name_files_that_fail(monkeypatch):
+    from jointfrf.cli import levels as command
+
+    words = ["levels", *EACH[1:5], "--level", "1,2,3,4", "--model", "assembly.toml", "--noise", "0.001"]
+    result = run_command(*words)
+    assert result.returncode == 1
+    assert result.stderr.splitlines()[-1].startswith("jointfrf: error: e.npz")
+    assert all(f"\n{one} " in result.stdout for one in "cdf")
+    assert "\ne " not in result.stdout
+    result = run_command(words[0], "e.npz", "--level", "1", *words[7:])
+    assert (result.returncode, result.stdout) == (1, "")
+    assert "e.npz" in result.stderr
+    fit, done = command._fit, []
+    monkeypatch.setattr(command, "_fit", lambda *own: fit(*own) if not done.append(own) and len(done) < 3 else 1 / 0)
+    assert "f.npz: division by zero" in run_command(*words).stderr
+    for name in ("third.json", "fourth.json"):
+        shutil.copy("fit.json", name)
+    Path("again.json").write_text("{")
+    result = run_command("pool", "fit.json", "again.json", "third.json", "fourth.json", "--factor", "day=1,1,2,2")
+    assert result.returncode == 1
+    assert result.stderr.splitlines()[-1].startswith("jointfrf: error: again.json: ")
+    assert "k_y" in result.stdout
+    result = run_command("pool", "fit.json", "again.json")
+    assert (result.returncode, result.stdout) == (1, "")
+    assert "again.json: " in result.stderr
+    result = run_command("pool", "fit.json", "third.json", "--factor", "day=1,1,2")
+    assert "--factor day has 3 groups; give 2, one for each file" in result.stderr
 
 
 @pytest.mark.parametrize(
@@ -328,7 +408,19 @@ def test_messages_speak_of_options(tmp_path, fields, words, message):
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no such signal")
 def test_an_interrupted_command_ends_with_one_sentence(tmp_path):
-    words = ["study", "3.1", "--estimator", "ismm", "--realisations", "1000000", "--jobs", "1", "--out", "study"]
+    words = [
+        "study",
+        "3.1",
+        "--estimator",
+        "ismm",
+        "--realisations",
+        "1000000",
+        "--jobs",
+        "1",
+        "--out",
+        "study",
+        "--quiet",
+    ]
     # A shell starts what runs in its background with the signal ignored, and tests hand that on.
     with subprocess.Popen([sys.executable, "-m", "jointfrf", *words], stdout=-1, stderr=-1, text=True,
                           start_new_session=True, preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
@@ -363,7 +455,19 @@ def _workers(children: Path) -> list[str]:
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="children are listed by Linux")
 @pytest.mark.parametrize("delay", [0, *(pytest.param(each, marks=pytest.mark.long) for each in (0.1, 0.2, 0.4, 0.8))])
 def test_an_interrupt_while_processes_start_ends_all_of_them(delay):
-    words = ["study", "3.1", "--estimator", "ismm", "--realisations", "1000000", "--jobs", "2", "--out", "study"]
+    words = [
+        "study",
+        "3.1",
+        "--estimator",
+        "ismm",
+        "--realisations",
+        "1000000",
+        "--jobs",
+        "2",
+        "--out",
+        "study",
+        "--quiet",
+    ]
     with subprocess.Popen([sys.executable, "-m", "jointfrf", *words], stdout=-1, stderr=-1, text=True,
                           start_new_session=True, preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
                           ) as process:  # fmt: skip
@@ -591,24 +695,94 @@ def test_completion_of_the_shells():
     assert done.stdout.split() == ["--band"], done.stderr
 
 
-def test_time_left_on_a_terminal(monkeypatch, capsys):
-    from jointfrf.cli import usage
+def test_warnings_are_sentences(monkeypatch):
+    def warn(args):
+        warnings.warn("error: sign: 101:+y is reversed; turn it", FrfCheckWarning, stacklevel=1)
+        warnings.warn("warning: gain: 102:+y", UserWarning, stacklevel=1)
+        with np.errstate(all="warn"):
+            assert np.isinf(np.array([1.0]) / 0.0 * np.float64(1e308) * 10).all()  # numpy's own warnings
+        usage.Output(args).give({})
+        return 0
 
-    clock = iter([0.0, 10.0, 20.0, 1000.0, 2000.0])
-    monkeypatch.setattr(usage.time, "monotonic", lambda: next(clock))
-    monkeypatch.setattr(usage.sys.stderr, "isatty", lambda: True, raising=False)
-    show = usage.progress("case")
-    show(1, 4)
-    show(2, 4)
-    show(3, 6)
-    show(1, 6)  # of another thread, later
-    show(4, 4)
-    said = capsys.readouterr().err
-    assert said.count("%") == 3
-    assert "case: 25 %, about 30 s left" in said
-    assert "case: 50 %, about 20 s left" in said
-    assert "about 17 min left" in said
-    assert said.endswith("\r\x1b[K")
+    monkeypatch.setattr("jointfrf.cli.cases.run", warn)
+    result = run_command("cases", "--json")
+    shown = ["sign: 101:+y is reversed; turn it", "gain: 102:+y"]
+    assert json.loads(result.stdout)["warnings"] == shown
+    assert result.stderr == "".join(f"jointfrf: warning: {text}\n" for text in shown)
+
+
+class _Clock:
+    """Time that passes only where a test says so, and waits of the thread that shows progress."""
+
+    def __init__(self, monkeypatch, is_terminal):
+        self.now = 0.0
+        monkeypatch.setattr(usage.time, "monotonic", lambda: self.now)
+        monkeypatch.setattr(usage.sys.stderr, "isatty", lambda: is_terminal, raising=False)
+
+    def text(self, *, bar=False):
+        return usage._progress_text(self.now, bar=bar)
+
+    def lines(self, times):
+        """Show progress at these times, as the thread does."""
+        waits = iter([*times, None])
+
+        class Ended:
+            def wait(this, seconds):  # noqa: N805
+                following = next(waits)
+                self.now = self.now if following is None else following
+                return following is None
+
+        usage._show_progress(Ended())
+
+
+def test_progress_has_stage_time_share_and_time_left(monkeypatch):
+    clock = _Clock(monkeypatch, is_terminal=True)
+    with usage.waiting("identify"), usage.waiting("tests") as count:
+        clock.now = 10.0
+        assert clock.text() == "tests: 10 s"
+        count(1, 4)
+        with usage.waiting("fit of a.uff"):
+            clock.now = 20.0
+            assert clock.text() == "fit of a.uff: 10 s, 25 %, about 60 s left"
+        count(2, 4)
+        assert clock.text(bar=True) == "[##########----------] tests: 20 s, 50 %, about 20 s left"
+        count(1, 4)  # of another thread, later
+        assert "50 %" in clock.text()
+        clock.now = 1000.0
+        count(3, 6)
+        assert clock.text() == "tests: 1000 s, 50 %, about 17 min left"
+        count(6, 6)  # all of one part: the next may begin
+        assert clock.text() == "tests: 1000 s"
+    assert not usage._STAGES
+
+
+def test_progress_is_a_line_now_and_then(monkeypatch, capsys):
+    clock = _Clock(monkeypatch, is_terminal=False)
+    with usage.waiting("plan"):
+        clock.lines([1.0, 2.9, 3.0, 8.0, 13.0, 13.5, 23.0])
+    assert capsys.readouterr() == ("", "jointfrf: plan: 3 s\njointfrf: plan: 13 s\njointfrf: plan: 23 s\n")
+
+
+def test_progress_on_a_terminal_gives_way_to_text(monkeypatch, capsys):
+    clock = _Clock(monkeypatch, is_terminal=True)
+    monkeypatch.setenv("COLUMNS", "20")
+    with usage.waiting("a very long name of a stage"):
+        clock.lines([1.0])
+        assert capsys.readouterr().err == "\r\x1b[Ka very long name of"[: 4 + 19]
+        usage.complain("error", "no")
+    assert capsys.readouterr().err == "\r\x1b[Kjointfrf: error: no\n"
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_every_command_that_takes_long_prints_its_stage(monkeypatch, capsys, quiet):
+    monkeypatch.setattr(usage, "FIRST_LINE", 0.0)
+    monkeypatch.setattr(usage, "_SETTLED", 0.01)
+    printed = threading.Event()
+    text = usage._progress_text
+    monkeypatch.setattr(usage, "_progress_text", lambda *args, **options: printed.set() or text(*args, **options))
+    monkeypatch.setattr("jointfrf.cli.cases.run", lambda args: 0 if quiet or printed.wait(60) else 1)
+    assert main(["cases", *(["--quiet"] if quiet else [])]) == 0
+    assert capsys.readouterr() == ("", "" if quiet else "jointfrf: cases: 0 s\n")
 
 
 def test_a_list_of_methods_names_one():
