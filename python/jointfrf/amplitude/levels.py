@@ -27,11 +27,8 @@ _CHANGES, _BENT = 0.05, 1e-4
 _MOST = 3
 #: Amplitudes of the fit that differ from those of the one before by less than this, e-fold, are found.
 _SETTLED, _ROUNDS = 0.02, 4
-#: What can be done about bent FRFs.
-_CURE = (
-    "measure with the motion held (response control) or at a lower level, leave out the lines where the amplitude "
-    "changes most, or use the backbone of a mode"
-)
+#: Remedy for amplitude-dependent FRFs that no fit follows.
+_CURE = "control the response, use a lower level, or use the backbone of a mode"
 
 
 @dataclass(frozen=True)
@@ -159,7 +156,7 @@ def levels(
     ------
     ValueError
         Numbers of fits, drives and labels that differ; a fit without FRFs; a drive that does not belong to its fit; a
-        joint without springs; every test bent by amplitude.
+        joint without springs; no test whose FRFs follow the amplitude.
 
     Notes
     -----
@@ -170,7 +167,7 @@ def levels(
     Where the amplitude changes over the lines by more than 1 %, fits with models are made again with K* linear in
     ln a, of the second and third power where these show (chance below 5 %, by the residual projected on dH/dK* times
     the next power beside all parameters); values are those at the amplitude of the level. Where that is not enough
-    (chance below 1e-4), or there are no models, the FRF is bent by amplitude, and the test is left out.
+    (chance below 1e-4), or there are no models, the test is left out.
 
     Examples
     --------
@@ -198,10 +195,10 @@ def levels(
         except ValueError as error:
             raise ValueError(f"{label}: {error}") from error
         if not one.lines:
-            raise ValueError(f"{label}: no DOF of the joint is a spring whose stiffness was found")
+            raise ValueError(f"{label}: no joint DOF is a spring with a stiffness; use a law spring for one DOF")
         if one.bent:
             refused[label] = "; ".join(one.bent.values())
-            text = f"{label}: FRFs bent by amplitude, left out: {refused[label]}; {_CURE}"
+            text = f"{label} is left out: {refused[label]}; {_CURE}"
             findings.append(warn("bent", text, tuple(one.bent)))
             continue
         findings += _of_fit(one, label)
@@ -209,7 +206,7 @@ def levels(
         for dof in one.lines:
             found.setdefault(dof, []).append(_level(one, dof, label, share))
     if not found:
-        raise ValueError(f"every test is bent by amplitude: {next(iter(refused.values()))}; {_CURE}")
+        raise ValueError(f"no test is left: {next(iter(refused.values()))}; {_CURE}")
     return of_levels(found, refused, findings, chosen, share, around)
 
 
@@ -243,12 +240,12 @@ def of_levels(
             findings.append(note("left out", f"{dof}: no law is fitted: {error}", (dof,)))
         if dof in of_laws and (best := of_laws[dof].fits[0]).widened > 1:
             text = (
-                f"{dof}: no law explains the levels: chi^2 of the best, {best.law}, is {best.chi_square:.3g} with "
-                f"{best.degrees} degrees of freedom; intervals of its parameters are {best.widened:.2g} times as wide"
+                f"{dof}: no law fits the levels: chi^2 of the best, {best.law}, is {best.chi_square:.3g} with "
+                f"{best.degrees} degrees of freedom; its intervals are widened {best.widened:.2g} times"
             )
             findings.append(warn("residual", text, (dof,)))
         if why:
-            findings.append(note("left out", f"{dof}: no laws are fitted to {why}", (dof,)))
+            findings.append(note("left out", f"{dof}: no law is fitted to {why}", (dof,)))
     joints = {label: joint for label, one in around.items() if (joint := _secant(found, label, one)) is not None}
     return JointLevels(ordered, of_laws, refused, worst_first(findings), share, joints)
 
@@ -267,12 +264,14 @@ def _secant(found: Mapping[str, Sequence[JointLevel]], label: str, around: LawJo
 def _labels(fits: Sequence[Fit], drives: Sequence[Drive], labels: Sequence[str] | None) -> tuple[str, ...]:
     for name, own, kind in (("fits", fits, Fit), ("drives", drives, Drive)):
         if not isinstance(own, Sequence) or not all(isinstance(one, kind) for one in own):
-            raise TypeError(f"{name} must be a sequence of {kind.__name__}")
+            raise TypeError(f"{name} has a wrong type; give a sequence of {kind.__name__}")
     if not fits or len(fits) != len(drives):
-        raise ValueError(f"fits and drives must be as many, at least one, not {len(fits)} and {len(drives)}")
+        raise ValueError(
+            f"{len(fits)} fits and {len(drives)} drives; give one drive for each fit, and at least one fit"
+        )
     named = tuple(f"level {i}" for i in range(1, len(fits) + 1)) if labels is None else as_names("labels", labels)
     if len(named) != len(fits) or len(set(named)) < len(named):
-        raise ValueError(f"labels must name each of the {len(fits)} fits, each another one")
+        raise ValueError(f"wrong labels; give {len(fits)} different names, one for each fit")
     return named
 
 
@@ -298,7 +297,7 @@ def _followed(fit: Fit, drive: Drive) -> _Followed:
             if changed is None:
                 break
             (fit, lines), orders = changed, more
-    bent = {dof: _words(dof, own, bend) for dof, own in lines.items()
+    bent = {dof: _words(dof, bend) for dof, own in lines.items()
             if (bend := own.bend(orders[dof] + 1)).p_value < _BENT}  # fmt: skip
     return _Followed(fit, lines, orders, bent)
 
@@ -329,13 +328,9 @@ def _of_fit(one: _Followed, label: str) -> list[Finding]:
     return [replace(each, text=f"{label}: {each.text}") for each in said]
 
 
-def _words(dof: str, own: DofLines, bend: Bend) -> str:
-    """Say how much K* of a test goes with amplitude."""
-    low, high = own.range()
-    return (
-        f"K* of {dof} is not what a smooth function of ln a makes of it while the amplitude goes from {low:.2g} to "
-        f"{high:.2g} over the lines (chance {bend.p_value:.1g})"
-    )
+def _words(dof: str, bend: Bend) -> str:
+    """State that K* of a test changes with amplitude as no fit follows."""
+    return f"K* of amplitude-dependent {dof} is no smooth function of ln a (p = {bend.p_value:.1g})"
 
 
 def _level(one: _Followed, dof: str, label: str, share: float) -> JointLevel:

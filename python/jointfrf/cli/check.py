@@ -9,7 +9,7 @@ from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.cli.measured_file import add_file_arguments, file_names, in_some_band, read_measured
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output
+from jointfrf.cli.usage import Output, waiting
 
 __all__ = ["add_arguments", "check_joint", "run"]
 
@@ -46,8 +46,9 @@ def check_joint(joint: MeasuredJoint, read_as: str) -> FrfCheck:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
-    measured = read_measured(args)
-    frfs = measured.receptance()
+    with waiting(f"reading {file_names(args)}"):
+        measured = read_measured(args)
+        frfs = measured.receptance()
     out.say(frfs.summary(), "")
     joint = None
     if any(getattr(args, name) is not None for name in _OF_JOINT):

@@ -135,7 +135,7 @@ def coupled(
     shared = {c.node for c in channels[0]} & {c.node for c in channels[1]}
     if shared:
         raise FileContentError(
-            f"node {min(shared)} is in {a.source} and in {b.source}: --renumber-b N adds a number to those of B"
+            f"node {min(shared)} is in {a.source} and in {b.source}; add a number to the nodes of B by --renumber-b N"
         )
     h = couple(matrices[0], matrices[1], joint, ends[0], ends[1], freq_hz=a.freq_hz)
     # Virtual points follow the channels of their side, and are not measured.
@@ -161,18 +161,22 @@ def _with_joint(
         own = [i for i, channel in enumerate(names) if channel.node in found and not channel.is_rotation]
         missing = [node for node in found if node not in frfs.coordinates]
         if missing:
-            raise FileContentError(f"{frfs.source} has no coordinates of node {missing[0]}, which --at needs")
+            raise FileContentError(
+                f"{frfs.source} has no coordinates of node {missing[0]}; add them, or leave out --at"
+            )
         geometry = channel_geometry([names[i] for i in own], frfs.coordinates)
         vp = virtual_point(*geometry, at, joint.dofs)
         whole = append_virtual_point(h, own, vp)
         return whole, list(range(len(names), whole.shape[1]))
     if len(found) != 1:
-        raise UsageError(f"several nodes at the joint ({found[0]}, {found[1]}, ...) need --at X,Y,Z, a virtual point")
+        raise UsageError(
+            f"several nodes at the joint ({found[0]}, {found[1]}, ...); give the virtual point by --at X,Y,Z"
+        )
     places = []
     for wanted in joint_channels_of(found[0], joint.dofs):
         if wanted not in names:
             raise FileContentError(
-                f"{frfs.source} has no FRFs at {wanted}, a DOF of the joint; nodes around it and --at X,Y,Z give one"
+                f"{frfs.source} has no FRFs at joint DOF {wanted}; give nodes around the joint and --at X,Y,Z"
             )
         places.append(names.index(wanted))
     return h, places

@@ -22,7 +22,7 @@ from jointfrf.cli.measured_file import (
     words,
 )
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_folder, waiting, warn_of_ignored
+from jointfrf.cli.usage import Output, UsageError, check_folder, listed, waiting, warn_of_ignored
 from jointfrf.errors import FileContentError, IdentificationWarning
 from jointfrf.files import write_file
 from jointfrf.identification.band_means import identify_band_mean
@@ -105,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
     s = None if args.s is None else [Channel(c.node + args.renumber_b, c.direction) for c in args.s]
     at = {"r": args.r, "s": s}
     unused = [f"--{point}" for point in ("r", "s") if point not in args.equation]
-    warn_of_ignored(args, unused, f"equation {args.equation} does not use it")
+    warn_of_ignored(args, unused, f"equation {args.equation} does not use {'it' if len(unused) == 1 else 'them'}")
     side_a = _side(a, args.j, args.dofs, args.r)
     side_b = _side(b, k, args.dofs, s)
     measured = assembly.matrix(at[args.equation[0]], at[args.equation[1]])
@@ -136,13 +136,14 @@ def _check(args: argparse.Namespace) -> None:
     wanted |= {f"--{point}": getattr(args, point) for point in dict.fromkeys(args.equation)}
     missing = [name for name, value in wanted.items() if value is None]
     if missing:
-        raise UsageError(f"equation {args.equation} needs {' and '.join(missing)}: see jointfrf decouple --help")
+        verb = "is" if len(missing) == 1 else "are"
+        raise UsageError(f"{listed(missing)} {verb} missing; equation {args.equation} needs {listed(list(wanted))}")
     for name, channels in (("--r", args.r), ("--s", args.s)):
         if channels is not None and len(channels) != len(args.dofs):
-            raise UsageError(f"{name} must name {len(args.dofs)} channels, as many as --dofs, not {len(channels)}")
+            raise UsageError(f"{name} names {len(channels)} channels; give {len(args.dofs)}, one for each of --dofs")
     for name, side in (("--j", args.j), ("--k", args.k)):
         if len(side.numbers) != 1:
-            raise UsageError(f"{name} must name one node, not {shown_nodes(side.numbers)}")
+            raise UsageError(f"{name} names nodes {shown_nodes(side.numbers)}; give one node")
 
 
 def _side(frfs: FrfSet, at: Nodes, dofs: list[str], internal: list[Channel] | None) -> _Side:
@@ -159,7 +160,9 @@ def _side(frfs: FrfSet, at: Nodes, dofs: list[str], internal: list[Channel] | No
 def _found(frfs: FrfSet, names: tuple[Channel, ...], wanted: list[Channel]) -> list[int]:
     for channel in wanted:
         if channel not in names:
-            raise FileContentError(f"{frfs.source} has no FRFs at {channel} (response and excitation)")
+            raise FileContentError(
+                f"{frfs.source} has no FRFs with {channel} as response and as excitation; name another channel"
+            )
     return [names.index(channel) for channel in wanted]
 
 

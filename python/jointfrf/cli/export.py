@@ -90,10 +90,10 @@ def add_arguments(parser: CommandParser) -> None:
 
 def _frequency(text: str) -> float | tuple[float, float]:
     low, colon, high = text.partition(":")
-    (found,) = numbers(low, 1, "a frequency in Hz, or LOW:HIGH")
-    last = numbers(high, 1, "LOW:HIGH in Hz")[0] if colon else found
+    (found,) = numbers(low, 1, ("frequency", "HZ or LOW:HIGH"))
+    last = numbers(high, 1, ("frequency", "LOW:HIGH in Hz"))[0] if colon else found
     if not found > 0 or (colon and not found < last):
-        raise argparse.ArgumentTypeError(f"must be a frequency above 0 Hz, or LOW:HIGH, not {text!r}")
+        raise argparse.ArgumentTypeError(f"{text!r} is no band or frequency above 0 Hz; use HZ or LOW:HIGH")
     return (float(found), float(last)) if colon else float(found)
 
 
@@ -122,7 +122,7 @@ def run(args: argparse.Namespace) -> int:
     if isinstance(found.joint, Joint) and at is not None:
         warn_of_ignored(args, ("--frequency",), "no law of this joint depends on frequency")
     if args.nodes_at is None:
-        warn_of_ignored(args, ("--joint-at",), "without --nodes-at the nodes are taken to lie at the joint")
+        warn_of_ignored(args, ("--joint-at",), "without --nodes-at the nodes are at the joint")
     is_table = isinstance(args.frequency, tuple)
     damping, cross = ("none", "zero") if is_table else _terms(_springs(found.joint, at))
     request = card_request(args, found.joint.dofs, damping=damping, cross=cross, points=_points(args, found))
@@ -145,7 +145,7 @@ def _by_hand(found: JointFile, request: CardRequest, freq_hz: float | None) -> s
     """Return the cards of a joint that was written by hand."""
     options: CardOptions = {**request.options, "comments": found.about}
     if isinstance(request.nodes, dict):
-        raise UsageError("nodes by names of joints are for a saved fit of several joints")
+        raise UsageError("the file has one joint without a name; give its nodes as PROGRAM:J,K")
     try:
         if isinstance(found.joint, LawJoint):
             return found.joint.export(request.program, request.nodes, freq_hz=freq_hz, **options)
@@ -163,8 +163,11 @@ def _at_point(found: JointFile, point: str | None) -> JointFile:
         return found
     if found.fit is None or point not in known:
         raise UsageError(
-            f"--point must name one joint point of the file, {', '.join(known) or 'which has none'}"
-            + (f", not {point!r}" if point is not None else ", or PROGRAM:NAME=J,K:... the nodes of all")
+            f"--point is {point!r}; use one of {', '.join(known)}"
+            if known and point is not None
+            else "the file has no joint points; leave out --point"
+            if point is not None
+            else f"the file has joint points {', '.join(known)}; name one by --point, or all by PROGRAM:NAME=J,K:..."
         )
     fit = found.fit.at_point(point)
     return found._replace(fit=fit, joint=fit.joint, about=(*found.about, f"joint point {point}"))
@@ -243,14 +246,18 @@ def parse_export(text: str) -> tuple[CardFormat, CardNodes]:
     program, _, rest = text.partition(":")
     known = get_args(CardFormat)
     if program not in known:
-        raise argparse.ArgumentTypeError(f"{program!r} is none of {', '.join(known)}{did_you_mean(program, known)}")
+        raise argparse.ArgumentTypeError(
+            f"unknown program {program!r}; use one of {', '.join(known)}{did_you_mean(program, known)}"
+        )
     if "=" not in rest:
         return cast(CardFormat, program), _ends(text, program, rest)
     of_joints: dict[str, list[int]] = {}
     for part in rest.split(":"):
         name, _, own = part.partition("=")
         if not name or name in of_joints:
-            raise argparse.ArgumentTypeError(f"{text!r} names {name or 'no joint'} {'twice' if name else f'of {own}'}")
+            raise argparse.ArgumentTypeError(
+                f"{text!r} names {name or 'no joint'} {'twice' if name else f'for {own}'}; name each joint once"
+            )
         of_joints[name] = _ends(text, program, own)
     return cast(CardFormat, program), of_joints
 
@@ -259,11 +266,11 @@ def _ends(text: str, program: str, rest: str) -> list[int]:
     """Return the nodes of one joint."""
     ends = list(nodes(rest).numbers) if rest else []
     if 0 < len(ends) < len(words(rest)):
-        raise argparse.ArgumentTypeError(f"{text!r} names a node twice")
+        raise argparse.ArgumentTypeError(f"{text!r} names a node twice; give different nodes")
     if len(ends) not in (2, 4 if program == "calculix" else 2):
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not a program and nodes j and k like abaqus:9001,9002, of several joints "
-            "abaqus:fl=9001,9002:fr=9003,9004; calculix takes two ROT NODEs more"
+            f"{text!r} is no program with nodes j and k; use abaqus:9001,9002, for several joints "
+            "abaqus:fl=9001,9002:fr=9003,9004, with two more ROT NODEs for calculix"
         )
     return ends
 
@@ -276,12 +283,12 @@ def page_nodes(args: argparse.Namespace) -> Sequence[int]:
 def _faces(text: str) -> tuple[list[int], list[int]]:
     one, colon, other = text.partition(":")
     if not colon:
-        raise argparse.ArgumentTypeError(f"{text!r} is not two lists of nodes like 11,12,13:21,22,23")
+        raise argparse.ArgumentTypeError(f"{text!r} is not two lists of nodes; use the form 11,12,13:21,22,23")
     return list(nodes(one).numbers), list(nodes(other).numbers)
 
 
 def _positions(text: str) -> tuple[tuple[float, ...], ...]:
-    found = numbers(text, 6, "xj,yj,zj,xk,yk,zk in m")
+    found = numbers(text, 6, ("pair of points", "xj,yj,zj,xk,yk,zk"))
     return found[:3], found[3:]
 
 
@@ -338,7 +345,7 @@ def card_request(
             if name.removeprefix("--").replace("-", "_") in args.given:
                 raise UsageError(f"{name} is for cards; add --export PROGRAM:J,K")
         flags = ("--element", "--property", "--full-matrix", "--connector", "--all-damping", "--bounds", "--no-damping")
-        warn_of_ignored(args, flags, "it is for cards, --export PROGRAM:J,K")
+        warn_of_ignored(args, flags, "no cards are written without --export PROGRAM:J,K")
         return None
     check_folder("--output", args.output)
     program, ends = args.export
@@ -375,12 +382,12 @@ def _check_joints(args: argparse.Namespace, dofs: Sequence[str], of_joints: Mapp
     if sorted(of_joints) != sorted(known) and (of_joints or len(known) > 1):
         example = ":".join(f"{name}={9001 + 2 * i},{9002 + 2 * i}" for i, name in enumerate(known) if name)
         raise UsageError(
-            f"--export must name the nodes of each joint, {', '.join(filter(None, known)) or 'one without a name'}"
-            + (f": {args.export[0]}:{example}" if example else f", such as {args.export[0]}:9001,9002")
+            f"--export does not name the nodes of each joint ({', '.join(filter(None, known)) or 'unnamed'}); use "
+            + (f"{args.export[0]}:{example}" if example else f"{args.export[0]}:9001,9002")
         )
     for name, given in (("--nodes-at", args.nodes_at), ("--faces", args.faces)):
         if of_joints and given is not None:
-            raise UsageError(f"{name} is of one joint: --save, then jointfrf export FILE PROGRAM:J,K --point NAME")
+            raise UsageError(f"{name} takes one joint; use --save, then jointfrf export FILE PROGRAM:J,K --point NAME")
 
 
 def _probe(n: int, dofs: Sequence[str], damping: str, cross: str) -> Joint:
@@ -395,9 +402,9 @@ def _refusal(why: str, damping: str) -> str:
     """Say with the words of the command line what a program cannot hold."""
     if "MATRIX27" in why and damping:
         may = f"--damping {damping} may find" if damping == "auto" else f"--damping {damping} fits"
-        return f"MATRIX27 of ansys holds no hysteretic damping, which {may}: say --damping viscous, or --no-damping"
+        return f"MATRIX27 of ansys takes no hysteretic damping, which {may}; use --damping viscous or --no-damping"
     if "rotation_nodes must" in why:
-        return "rotations of calculix need the ROT NODEs of both rigid bodies after their nodes: calculix:J,K,ROTJ,ROTK"
+        return "rotations of calculix need the ROT NODEs of both rigid bodies; use calculix:J,K,ROTJ,ROTK"
     for argument, option in _OPTIONS:
         why = why.replace(argument, option)
     return why

@@ -30,7 +30,7 @@ from jointfrf.cli.measured_file import (
 )
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_folder, check_out, plain, waiting, warn_of_ignored
+from jointfrf.cli.usage import Interrupt, Output, UsageError, check_folder, check_out, plain, waiting, warn_of_ignored
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
 from jointfrf.extras import check_extras
@@ -57,7 +57,7 @@ def _methods(text: str) -> list[str]:
     for word in found or [text]:
         if word not in _METHODS:
             hint = did_you_mean(word, _METHODS)
-            raise argparse.ArgumentTypeError(f"{word!r} is not one of {', '.join(_METHODS)}{hint}")
+            raise argparse.ArgumentTypeError(f"unknown method {word!r}; use one of {', '.join(_METHODS)}{hint}")
     return found
 
 
@@ -151,35 +151,40 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     _check_results(args)
     if args.model is not None:
-        _refuse(args, ("points", "same"), "is of FRFs at the joint points themselves: it does not go with --model")
+        _refuse(args, ("points", "same"), "is for FRFs at the joint; leave it out with --model")
         return run_model(args)
-    _refuse(args, ("each", "find_wrong_channels"), "is for tests with --model: name the file of the assembly")
+    _refuse(args, ("each", "find_wrong_channels"), "needs --model; name the assembly.toml")
     out = Output(args)
     _check_points(args)
-    measured = read_measured(args)
-    frfs = measured.receptance()
+    with waiting(f"reading {file_names(args)}"):
+        measured = read_measured(args)
+        frfs = measured.receptance()
     joint = measured_joint(args, frfs, args.bending_stiffness)
     laws = joint_of_laws(args, joint.dofs)
     sides = _sides(args, frfs, joint)
     points = np.array(joint.responses.references)
     damping = args.damping if laws is None else "none"
     request = card_request(args, joint.dofs, damping=damping, cross=args.cross, points=points)
-    check = check_joint(joint, measured.quantity)
+    with waiting("data checks"):
+        check = check_joint(joint, measured.quantity)
     if not args.accept_bent:
         refuse_bent(check.findings)
     _warn(args, joint, check)
     out.say(*_heading(args, frfs, joint), *(line for side in sides for line in side.text))
-    fits = []
-    for method in args.method:
-        with waiting(f"fit by {method}"):
-            fits.append(_fit(args, method, frfs, joint, laws, tuple(side.model for side in sides)))
-        out.say("", fits[-1])
-        out.warn(*fits[-1].warnings)
-    text, written = _write_results(args, frfs, joint, fits, request)
+    fits, interrupt = list[Fit](), Interrupt()
+    with interrupt.kept_back(fits):
+        for method in args.method:
+            with waiting(f"fit by {method}"):
+                fits.append(_fit(args, method, frfs, joint, laws, tuple(side.model for side in sides)))
+            out.say("", fits[-1])
+            out.warn(*fits[-1].warnings)
+    with waiting("results"):
+        text, written = _write_results(args, frfs, joint, fits, request)
     if text and args.output is None:
         out.say("", text.rstrip("\n"))
     out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
     out.give(_content(args, joint, check, fits, text, written))
+    interrupt.resume()
     return 0
 
 
@@ -191,12 +196,12 @@ def _check_results(args: argparse.Namespace) -> None:
     if args.report is not None:
         check_extras("jinja2", *(["plotly"] if args.space else []))
         if "compliance" not in args.method:
-            raise UsageError("--report is of method compliance: name it among the methods")
+            raise UsageError("--report needs method compliance; add it to --method")
         check_out("--report", args.report.parent)
         if args.report.is_dir():
-            raise UsageError(f"--report: {args.report} is a folder, not a file")
+            raise UsageError(f"--report: {args.report} is a folder; name a file")
     elif args.space:
-        raise UsageError("--space is of --report: name a file for the page")
+        raise UsageError("--space needs a page; add --report FILE")
     check_folder("--save", args.save)
 
 
@@ -210,11 +215,11 @@ def _refuse(args: argparse.Namespace, names: tuple[str, ...], why: str) -> None:
 def _check_points(args: argparse.Namespace) -> None:
     """Raise an error for options that do not go with the number of joint points."""
     if args.save is None:
-        warn_of_ignored(args, ("--save-lines",), "it is for --save")
+        warn_of_ignored(args, ("--save-lines",), "nothing is saved without --save")
     if args.points is None:
-        _refuse(args, ("same",), "is of several joint points: name them by --points")
+        _refuse(args, ("same",), "needs several joint points; name them by --points")
     else:
-        _refuse(args, ("side_j", "side_k"), "corrects the FRFs of one joint point: it does not go with --points")
+        _refuse(args, ("side_j", "side_k"), "is for one joint point; leave out --points")
 
 
 def _warn(args: argparse.Namespace, joint: MeasuredJoint, check: FrfCheck) -> None:
@@ -226,7 +231,7 @@ def _warn(args: argparse.Namespace, joint: MeasuredJoint, check: FrfCheck) -> No
         warn_of_ignored(
             args,
             ("--damping", "--cross", "--noise", "--setup-gain", "--common-gain", "--window-decay"),
-            f"method {args.method[0]} does not use it",
+            f"method {args.method[0]} uses no such option",
         )
     if joint.channels is not None or len(joint.nodes[0]) == 1:
         warn_of_ignored(args, ("--bending-stiffness",), "no rotation is found by differences along a line")
@@ -243,8 +248,9 @@ def _write_results(
     if request is not None:
         text = written_cards(fits[0], request, [f"from {file_names(args)}", *_places(joint)])
         written += [] if args.output is None else [args.output]
-    if args.report is not None:
-        fit = fits[args.method.index("compliance")]
+    finished = dict(zip(args.method, fits, strict=False))
+    if args.report is not None and "compliance" in finished:
+        fit = finished["compliance"]
         args.report.parent.mkdir(parents=True, exist_ok=True)
         written.append(write_report(fit, args.report, source=file_names(args), command=args.typed,
                                     nodes=page_nodes(args), space=args.space))  # fmt: skip
@@ -305,9 +311,9 @@ def _sides(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint) -> list
     if not paths:
         return []
     if len(paths) == 1:
-        raise UsageError("--side-j and --side-k go together: both sides of the joint bend")
+        raise UsageError("only one side has a model; give both --side-j and --side-k")
     if "compliance" not in args.method:
-        raise UsageError("--side-j and --side-k are of method compliance: name it among the methods")
+        raise UsageError("--side-j and --side-k need method compliance; add it to --method")
     lines, _ = in_some_band(frfs.freq_hz, joint.h, args.band)
     found = []
     for side, path in enumerate(paths):

@@ -18,7 +18,7 @@ from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.cli.export import CardRequest, card_request, page_nodes, written_cards
 from jointfrf.cli.measured_file import file_names, read_receptances, setups_with_gains
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Failures, Interrupt, Output, UsageError, waiting
+from jointfrf.cli.usage import Failures, Interrupt, Output, UsageError, listed, waiting
 from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
 from jointfrf.files import write_file
 from jointfrf.identification.record import fit_to_dict, write_record
@@ -114,10 +114,12 @@ def _check_options(args: argparse.Namespace) -> None:
     given += ["--damping"] if args.damping != "auto" else []
     given += ["--cross"] if args.cross != "zero" else []
     if given:
-        verb = "is" if len(given) == 1 else "are"
-        raise UsageError(f"{', '.join(given)} {verb} of fits without models: with --model, {args.model} says the joint")
+        verb, pronoun = ("is", "it") if len(given) == 1 else ("are", "them")
+        raise UsageError(
+            f"{listed(given)} {verb} for fits without models; leave {pronoun} out, since {args.model} defines the joint"
+        )
     if args.each and args.export is not None and args.output is None:
-        raise UsageError("--export of several tests needs --output: the cards of each go into a file of their own")
+        raise UsageError("--export of several tests needs files; add --output")
 
 
 def _stems(files: Sequence[Path]) -> list[str]:
@@ -126,7 +128,7 @@ def _stems(files: Sequence[Path]) -> list[str]:
     if len(set(stems)) < len(stems):
         stems = [f"{path.parent.name}_{path.stem}" for path in files]
     if len(set(stems)) < len(stems):
-        raise UsageError("two files of --each have the same name")
+        raise UsageError("two files of --each have the same name; rename one")
     return stems
 
 
@@ -195,7 +197,7 @@ def _read(args: argparse.Namespace) -> FrfSet:
     try:
         return read_receptances(args)
     except FileContentError as error:
-        hint = "; with --each every file is a test of its own" if len(args.files) > 1 else ""
+        hint = "; use --each if every file is a test of its own" if len(args.files) > 1 else ""
         raise FileContentError(f"{error}{hint}") from error
 
 

@@ -130,7 +130,7 @@ def _numbers(word: str) -> list[float]:
     try:
         return [float(one) for one in word.split(",")]
     except ValueError:
-        raise argparse.ArgumentTypeError(f"must be numbers between commas, not {word!r}") from None
+        raise argparse.ArgumentTypeError(f"{word!r} is no list of numbers; separate them by commas") from None
 
 
 def _laws(word: str) -> list[str]:
@@ -140,10 +140,12 @@ def _laws(word: str) -> list[str]:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     if args.model is not None:
-        warn_of_ignored(args, _OF_THE_JOINT, "it is for FRFs at the joint, without --model")
+        warn_of_ignored(args, _OF_THE_JOINT, "--model defines the joint")
     elif args.backbone is not None or args.j is None:
-        why = "a backbone needs it" if args.backbone is not None else "name the joint in the files by --j, --k, --dofs"
-        raise UsageError(f"--model is missing: assembly.toml says what both parts and the joint are; {why}")
+        why = (
+            "add it for a backbone" if args.backbone is not None else "add it, or locate the joint by --j, --k, --dofs"
+        )
+        raise UsageError(f"--model is missing; {why}")
     for option, path in (("--report", args.report), ("--output", args.output)):
         check_folder(option, path)
     if args.report is not None:
@@ -178,7 +180,7 @@ def _write_joints(found: JointLevels, folder: Path) -> list[Path]:
     """Write the joint of each level by its label."""
     names = {label: re.sub(r"^\.|[^\w.+-]", "_", label) for label in found.joints}
     if len(set(names.values())) < len(names):
-        raise UsageError("--joints: two labels give the same name of a file")
+        raise UsageError("--joints: two labels give the same file name; change a label")
     folder.mkdir(parents=True, exist_ok=True)
     return [write_joint(folder / f"{names[label]}.toml", joint) for label, joint in found.joints.items()]
 
@@ -189,7 +191,7 @@ def _by_name(one: JointLevel) -> dict[str, Any]:
 
 def _of_fits(args: argparse.Namespace, failures: Failures, interrupt: Interrupt) -> tuple[JointLevels, dict[str, Any]]:
     """Return the levels of files, and the tests they are from."""
-    warn_of_ignored(args, ("--channel", "--dof", "--errors"), "there is no --backbone")
+    warn_of_ignored(args, ("--channel", "--dof", "--errors"), "no --backbone is given")
     tests, fits = _tests(args), dict[_Test, tuple[Fit, Drive]]()
     drives = {one: _drive(args, one) for one in tests}
     with warnings.catch_warnings():
@@ -210,9 +212,9 @@ def _of_fits(args: argparse.Namespace, failures: Failures, interrupt: Interrupt)
 def _of_backbone(args: argparse.Namespace) -> tuple[JointLevels, dict[str, Any]]:
     """Return the levels of the backbone of a mode, and where it stands."""
     if args.files or args.table is not None or args.level is not None:
-        raise UsageError("--backbone has the levels: leave out files, --table and --level")
+        raise UsageError("--backbone contains the levels; leave out files, --table and --level")
     if args.channel is None:
-        raise UsageError("--channel is missing: where the amplitude of the backbone was measured, such as A/1:y")
+        raise UsageError("--channel is missing; name the DOF of the measured amplitude, such as A/1:y")
     warn_of_ignored(args, ("--held", "--noise", "--band", *READING), "no file of FRFs is read")
     backbone = _backbone(args)
     file, lines = read_assembly_file(args.model), np.unique(backbone.freq_hz)
@@ -230,21 +232,21 @@ def _backbone(args: argparse.Namespace) -> Backbone:
     names = ("frequency", "amplitude", second)
     for name in names:
         if name not in table.heading:
-            raise FileContentError(f"{path}: has no column {name}{did_you_mean(name, table.heading)}")
+            raise FileContentError(f"{path}: column {name} is missing; add it{did_you_mean(name, table.heading)}")
     if {"force", "damping"} <= set(table.heading):
-        raise FileContentError(f"{path}: has damping and force: of a test at phase resonance leave out damping")
+        raise FileContentError(f"{path}: has damping and force; leave out damping for tests at phase resonance")
     if len(set(table.heading)) < len(table.heading):
-        raise FileContentError(f"{path}: two columns have the same name")
+        raise FileContentError(f"{path}: two columns have the same name; rename one")
     for where, cells in table.rows:
         for name, cell in zip(table.heading, cells, strict=True):
             if name in names:
                 try:
                     table.number(cell)
                 except ValueError:
-                    raise FileContentError(f"{where}: the {name} {cell!r} is no number") from None
+                    raise FileContentError(f"{where}: {name} {cell!r} is no number; correct it") from None
             columns.setdefault(name, []).append(cell)
     if not columns:
-        raise FileContentError(f"{path}: has no rows")
+        raise FileContentError(f"{path}: has no rows; add one for each test")
     if len(args.errors) != 2:
         raise UsageError(f"--errors has {len(args.errors)} numbers; give two, of frequency and of damping")
     freq, amplitude, other = (np.array([table.number(cell) for cell in columns[name]]) for name in names)
@@ -262,14 +264,14 @@ def _backbone(args: argparse.Namespace) -> Backbone:
 def _tests(args: argparse.Namespace) -> list[_Test]:
     """Return files, names and levels, from the table or from the command line."""
     if args.table is not None and (args.files or args.level is not None):
-        raise UsageError("--table names files and levels: leave out those of the command line")
+        raise UsageError("--table names files and levels; leave out FILE and --level")
     if args.table is not None:
         return _of_table(args.table)
     if not args.files:
-        raise UsageError("name the files of all levels, or a table of them by --table")
+        raise UsageError("no files are given; name one for each level, or a table by --table")
     given = [] if args.level is None else args.level
     if len(given) != len(args.files):
-        raise UsageError(f"--level must name {len(args.files)} levels, one for each file, not {len(given)}")
+        raise UsageError(f"--level has {len(given)} levels; give {len(args.files)}, one for each file")
     labels = [path.stem for path in args.files]
     if len(set(labels)) < len(labels):
         labels = [str(path) for path in args.files]
@@ -280,19 +282,19 @@ def _of_table(path: Path) -> list[_Test]:
     table = read_text_table(path)
     for name in (_FILE, _LEVEL):
         if name not in table.heading:
-            raise FileContentError(f"{path}: has no column {name}{did_you_mean(name, table.heading)}")
+            raise FileContentError(f"{path}: column {name} is missing; add it{did_you_mean(name, table.heading)}")
     if len(set(table.heading)) < len(table.heading):
-        raise FileContentError(f"{path}: two columns have the same name")
+        raise FileContentError(f"{path}: two columns have the same name; rename one")
     found = []
     for where, cells in table.rows:
         row = dict(zip(table.heading, cells, strict=True))
         try:
             level = table.number(row[_LEVEL])
         except ValueError:
-            raise FileContentError(f"{where}: the level {row[_LEVEL]!r} is no number") from None
+            raise FileContentError(f"{where}: level {row[_LEVEL]!r} is no number; correct it") from None
         found.append(_Test(path.parent / row[_FILE], row.get(_LABEL, Path(row[_FILE]).stem), level))
     if not found:
-        raise FileContentError(f"{path}: has no rows")
+        raise FileContentError(f"{path}: has no rows; add one for each test")
     return found
 
 
@@ -321,7 +323,9 @@ def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Driv
     channels = [str(one) for one in joint.responses.channels]
     if drive.held == "response" and drive.channel not in channels:
         hint = did_you_mean(drive.channel, channels)
-        raise UsageError(f"--held {drive.channel}: {test.path.name} has {', '.join(channels)} at the joint{hint}")
+        raise UsageError(
+            f"--held {drive.channel}: {test.path.name} has no such channel; use one of {', '.join(channels)}{hint}"
+        )
     with waiting(f"fit of {test.path.name}"):
         known = joint.known(frfs)
         fit = identify(frfs.freq_hz, joint.h, joint.dofs, args.band, noise=args.noise, accept_bent=True, **known)

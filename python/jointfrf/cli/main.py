@@ -65,8 +65,8 @@ def _run(words: list[str], stop_if_interrupted: Callable[[], None]) -> int:
     """Run one command."""
     name = words[0]
     if name not in COMMANDS:
-        hint = did_you_mean(name, COMMANDS) or ": jointfrf --help lists them"
-        raise UsageError(f"there is no command {name!r}{hint}")
+        hint = did_you_mean(name, COMMANDS) or "; see jointfrf --help"
+        raise UsageError(f"unknown command {name!r}{hint}")
     parser = command_parser(name)  # imports the command
     stop_if_interrupted()
     args = parser.parse_words(words[1:])

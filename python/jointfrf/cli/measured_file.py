@@ -80,7 +80,7 @@ class Nodes(NamedTuple):
         found = [node for node in self.numbers if node in there]
         if missing or not found:
             which = f"node {missing[0]}" if missing else f"nodes {self.numbers[0]} to {self.numbers[-1]}"
-            raise FileContentError(f"{source} has no FRF at {which}; it has nodes {shown_nodes(there)}")
+            raise FileContentError(f"{source} has no FRF at {which}; use nodes of {shown_nodes(there)}")
         return found
 
 
@@ -112,13 +112,13 @@ def nodes(text: str) -> Nodes:
         except ValueError:
             low, high = 0, 0
         if not 0 < low <= high:
-            raise argparse.ArgumentTypeError(f"{word!r} is no node number or range like 102,104 or 101:116")
+            raise argparse.ArgumentTypeError(f"{word!r} is no node number or range; use the form 102,104 or 101:116")
         if high - low >= _MOST_NODES:
-            raise argparse.ArgumentTypeError(f"{word} are more than {_MOST_NODES} nodes")
+            raise argparse.ArgumentTypeError(f"{word} are too many nodes; name at most {_MOST_NODES}")
         found += range(low, high + 1)
         single |= set() if colon else {low}
     if not found:
-        raise argparse.ArgumentTypeError(f"{text!r} names no nodes: 102,104 or 101:116")
+        raise argparse.ArgumentTypeError(f"{text!r} names no nodes; use the form 102,104 or 101:116")
     return Nodes(tuple(dict.fromkeys(found)), frozenset(single))
 
 
@@ -129,24 +129,24 @@ def joint_dofs(text: str) -> list[str]:
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
     if not found:
-        raise argparse.ArgumentTypeError(f"{text!r} names no DOFs, like y,theta_x")
+        raise argparse.ArgumentTypeError(f"{text!r} names no DOFs; use the form y,theta_x")
     return list(found)
 
 
-def numbers(text: str, count: int, like: str) -> tuple[float, ...]:
-    """Return some finite numbers between commas."""
+def numbers(text: str, count: int, like: tuple[str, str]) -> tuple[float, ...]:
+    """Return some finite numbers between commas; `like` is what they are and an example, for the message."""
     try:
         found = tuple(float(word) for word in words(text))
     except ValueError:
         found = ()
     if len(found) != count or not np.isfinite(found).all():
-        raise argparse.ArgumentTypeError(f"{text!r} is not like {like}")
+        raise argparse.ArgumentTypeError(f"{text!r} is no {like[0]}; use the form {like[1]}")
     return found
 
 
 def point(text: str) -> tuple[float, ...]:
     """Return the coordinates of a point, m."""
-    return numbers(text, 3, "x,y,z in m: 0.0625,0,0")
+    return numbers(text, 3, ("point", "x,y,z in m: 0.0625,0,0"))
 
 
 def parse_band(text: str) -> tuple[float, float]:
@@ -154,7 +154,7 @@ def parse_band(text: str) -> tuple[float, float]:
     try:
         low, high = (float(part) for part in text.split(":"))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a band like 200:550 (Hz)") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is no band; use the form 200:550 (Hz)") from None
     return low, high
 
 
@@ -226,17 +226,17 @@ def _field(text: str) -> tuple[str, str]:
     field, equals, name = text.partition("=")
     if not equals or field not in _FIELDS or not name:
         hint = did_you_mean(field, _FIELDS) if equals else ""
-        raise argparse.ArgumentTypeError(f"{text!r} is not FIELD=NAME with a field out of {', '.join(_FIELDS)}{hint}")
+        raise argparse.ArgumentTypeError(f"{text!r} is not FIELD=NAME; use a field of {', '.join(_FIELDS)}{hint}")
     return field, name
 
 
 def reading_options(args: argparse.Namespace) -> dict[str, Any]:
     """Return what the command line says of the files, as `jointfrf.io.read_frfs` takes it."""
     if args.force_quantity and args.quantity is None:
-        raise UsageError("--force-quantity needs --quantity")
+        raise UsageError("--force-quantity without a quantity; add --quantity")
     mapping = dict(args.map or ())
     if len(mapping) < len(args.map or ()):
-        raise UsageError("--map names a field twice")
+        raise UsageError("--map names a field twice; name each field once")
     return {"quantity": args.quantity, "force_quantity": args.force_quantity, "mapping": mapping}
 
 

@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     folder = options.folder or Path(f"my-{options.kind}")
     case = folder / "case.toml"
     if case.exists() or case.is_symlink():
-        raise UsageError(f"{case} exists: name another folder")
+        raise UsageError(f"{case} exists; name another folder")
     design = {"study": {"realisations": 20, "factors": {"noise": [0.01, 0.05], "lines": [50, 200]}}}
     examples = {**top.examples, **(design if is_study else {})}
     folder.mkdir(parents=True, exist_ok=True)
@@ -75,7 +75,7 @@ def _new_assembly(options: argparse.Namespace) -> int:
     folder = options.folder or Path("my-assembly")
     path, beside = folder / "assembly.toml", folder / "assembly.schema.json"
     if path.exists() or path.is_symlink():
-        raise UsageError(f"{path} exists: name another folder")
+        raise UsageError(f"{path} exists; name another folder")
     folder.mkdir(parents=True, exist_ok=True)
     write_file(beside, schema)
     write_file(path, TEMPLATE)

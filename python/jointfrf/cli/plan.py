@@ -18,7 +18,7 @@ from jointfrf.cases.known_joint.keys import KnownJointCase
 from jointfrf.cases.substructures import MeasuredStructure, ModelStructure
 from jointfrf.cli.frf import add_line_arguments, lines_of
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_folder, waiting, warn_of_ignored
+from jointfrf.cli.usage import Output, UsageError, check_folder, listed, waiting, warn_of_ignored
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import FileContentError
 from jointfrf.extras import check_extras
@@ -104,7 +104,7 @@ def _positive(word: str) -> float:
     except ValueError:
         found = -1.0
     if not 0 < found < float("inf"):
-        raise argparse.ArgumentTypeError(f"must be a number above zero, not {word!r}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no number above zero; give one")
     return found
 
 
@@ -121,7 +121,7 @@ def _dofs(word: str) -> list[str]:
         else:
             found.append(part.strip())
     if not all(found):
-        raise argparse.ArgumentTypeError(f"must be DOFs between commas, A/7:y,B/3:y, not {word!r}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no list of DOFs; use the form A/7:y,B/3:y")
     return found
 
 
@@ -132,12 +132,12 @@ def run(args: argparse.Namespace) -> int:
     if args.report is not None:
         check_extras("jinja2")
     if (args.spread is None) != (args.next is None):
-        raise UsageError("--spread and --next belong together: --spread 0.1 --next 0.3")
+        raise UsageError("only one of --spread and --next is given; give both, such as --spread 0.1 --next 0.3")
     freq = lines_of(args)
     assert freq is not None  # --step is required
     if args.model.is_dir() or args.model.name == _CASE:
         return _of_case(args, freq, out)
-    warn_of_ignored(args, ("--spacings",), "a test with models takes translations as they are")
+    warn_of_ignored(args, ("--spacings",), "it is for case.toml")
     file = read_assembly_file(args.model)
     file.check_values()
     parts = file.parts(freq)
@@ -149,7 +149,7 @@ def run(args: argparse.Namespace) -> int:
     for name, dofs in (("--sensors", chosen[0] + kept[0]), ("--hits", chosen[1] + kept[1])):
         check_dofs(parts, file.keys, name, dofs)
     if args.sensors is not None and args.hits is not None:
-        warn_of_ignored(args, ("--candidates",), "--sensors and --hits name them")
+        warn_of_ignored(args, ("--candidates",), "--sensors and --hits name the candidates")
     used = list(dict.fromkeys(dof for own in (*chosen, *kept) for dof in own))
     with waiting(f"plan of {args.model.name}"):
         assembly = file.assembly(freq, parts, used)
@@ -182,10 +182,10 @@ def _of_case(args: argparse.Namespace, freq: FloatArray, out: Output) -> int:
     """Say what FRFs between all joint DOFs of a case will know."""
     of_parts = [name for name in _OF_PARTS if name.removeprefix("--").replace("-", "_") in args.given]
     if of_parts:
-        raise UsageError(f"{', '.join(of_parts)}: a case has all FRFs between its joint DOFs, and nothing is chosen")
+        raise UsageError(f"a case has all FRFs between its joint DOFs; leave out {listed(of_parts)}")
     case, _ = read_case_and_kind(args.model if args.model.is_dir() else args.model.parent)
     if not isinstance(case, KnownJointCase):
-        raise FileContentError(f"{args.model}: a plan takes a case of two parts and a joint (kind known-joint)")
+        raise FileContentError(f"{args.model}: wrong kind of case; use a case of kind known-joint")
     case = replace(case, freq_hz=freq)
     exact = exact_frfs(case)
     biased = {f"{1e3 * spacing:g} mm": frfs_by_differences(case, spacing) for spacing in args.spacings or ()}
@@ -223,7 +223,7 @@ def _located(parts: Mapping[str, AssemblyPart], dofs: list[str]) -> list[str]:
 def _candidates(parts: Mapping[str, AssemblyPart], most: int) -> list[str]:
     """Return translations of nodes of all parts, far from each other."""
     if most < 1:
-        raise UsageError(f"--candidates must be at least 1, not {most}")
+        raise UsageError(f"--candidates is {most}; give at least 1")
     found: list[str] = []
     for letter, part in parts.items():
         if isinstance(part.keys, ReceptancesPart):

@@ -80,14 +80,14 @@ def add_arguments(parser: CommandParser) -> None:
 def _names(word: str) -> list[str]:
     names = [one.strip() for one in word.split(",")]
     if not all(names):
-        raise argparse.ArgumentTypeError(f"must be names between commas, not {word!r}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no list of names; separate them by commas")
     return names
 
 
 def _factor(word: str) -> tuple[str, list[str]]:
     name, equals, groups = word.partition("=")
     if not (name and equals and groups):
-        raise argparse.ArgumentTypeError(f"must be NAME=GROUP,GROUP,..., not {word!r}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no factor; use the form NAME=GROUP,GROUP,...")
     return name, _names(groups)
 
 
@@ -97,21 +97,21 @@ def _share(word: str) -> float:
     except ValueError:
         found = -1.0
     if not 0 <= found < float("inf"):
-        raise argparse.ArgumentTypeError(f"must be a share such as 0.05, not {word!r}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no share; use a number such as 0.05")
     return found
 
 
 def _common(word: str) -> tuple[str, float]:
     name, equals, share = word.rpartition("=")
     if equals and not name:
-        raise argparse.ArgumentTypeError(f"must be ERROR or NAME=ERROR, not {word!r}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no error; use the form ERROR or NAME=ERROR")
     return name, _share(share)
 
 
 def _probability(word: str) -> float:
     found = _share(word)
     if not 0 < found < 1:
-        raise argparse.ArgumentTypeError(f"must lie between 0 and 1, not {word!r}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no probability; use a number between 0 and 1")
     return found
 
 
@@ -127,13 +127,13 @@ def run(args: argparse.Namespace) -> int:
     sources = [str(path) for path in files]
     if args.transfer:
         of_pool = ("--factor", "--trend", "--common", "--probability", "--report", "--output")
-        warn_of_ignored(args, of_pool, "it is of the pool, and --transfer only tests")
+        warn_of_ignored(args, of_pool, "--transfer only tests")
         compared = _transferred(args, fits, labels)
         out.say(compared)
         out.give({"sources": sources, "transfer": asdict(compared), "failed": failures.found})
         failures.complain()
         return 1 if failures.found else 0
-    warn_of_ignored(args, ("--spread",), "it is of --transfer")
+    warn_of_ignored(args, ("--spread",), "it is for --transfer")
     pooled = _pooled(args, fits, labels, factors)
     written = []
     if args.report is not None:
@@ -170,11 +170,11 @@ def _loaded(
 def _tests(args: argparse.Namespace) -> tuple[list[Path], list[str], dict[str, Sequence[str]]]:
     """Return files, labels and factors, from the table or from the command line."""
     if args.table is not None and (args.files or args.factor):
-        raise UsageError("--table names files and factors: leave out those of the command line")
+        raise UsageError("--table names files and factors; leave out FIT and --factor")
     if args.table is not None:
         return _of_table(args.table)
     if not args.files:
-        raise UsageError("name saved fits, or a table of them by --table")
+        raise UsageError("no fits are given; name files of identify --save, or a table by --table")
     labels = [path.stem for path in args.files]
     if len(set(labels)) < len(labels):
         labels = [str(path) for path in args.files]
@@ -184,9 +184,9 @@ def _tests(args: argparse.Namespace) -> tuple[list[Path], list[str], dict[str, S
 def _of_table(path: Path) -> tuple[list[Path], list[str], dict[str, Sequence[str]]]:
     table = read_text_table(path)
     if _FILE not in table.heading:
-        raise FileContentError(f"{path}: has no column {_FILE}{did_you_mean(_FILE, table.heading)}")
+        raise FileContentError(f"{path}: column {_FILE} is missing; add it{did_you_mean(_FILE, table.heading)}")
     if len(set(table.heading)) < len(table.heading):
-        raise FileContentError(f"{path}: two columns have the same name")
+        raise FileContentError(f"{path}: two columns have the same name; rename one")
     rows = [cells for _, cells in table.rows]
     columns = dict(zip(table.heading, map(list, zip(*rows, strict=True)), strict=True))
     files = [path.parent / name for name in columns.pop(_FILE, [])]
@@ -200,7 +200,7 @@ def _pooled(
     shared = dict(args.common or ())
     common: Any = shared.get("", 0.0) if set(shared) <= {""} else shared
     if isinstance(common, dict) and "" in common:
-        raise UsageError("--common: an error of all files and errors of groups: name the first as a factor, too")
+        raise UsageError("--common gives errors of all files and of groups; name a factor for the first, too")
     return pool(
         fits, labels=labels, factors=factors, trends=args.trend or (), common=common, parameters=args.parameters,
         probability=args.probability,

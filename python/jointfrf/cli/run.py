@@ -48,10 +48,10 @@ def run(options: argparse.Namespace) -> int:
         raise UsageError(error) from error
     folders = list(dict.fromkeys(folders))
     if not folders:
-        raise UsageError("no cases come with this installation: name a folder with a case.toml")
+        raise UsageError("this installation contains no cases; name a folder with a case.toml")
     twice = {folder.name for folder in folders if [f.name for f in folders].count(folder.name) > 1}
     if twice:
-        raise UsageError(f"two cases are called {min(twice)}: their results would overwrite each other")
+        raise UsageError(f"two cases are called {min(twice)}; rename a folder, or run them one at a time")
     out = Output(options)
 
     def say(text: str) -> None:

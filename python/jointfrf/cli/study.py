@@ -10,7 +10,7 @@ from typing import Any, get_args
 
 from jointfrf.cases.catalogue import UnknownCaseError
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_out, positive, waiting, warn_of_ignored
+from jointfrf.cli.usage import Output, UsageError, check_out, listed, positive, waiting, warn_of_ignored
 from jointfrf.extras import check_extras, import_extra
 from jointfrf.parallel.pool import AnyExecutor, available_cores, check_processes, safe_environment
 from jointfrf.studies.design import Arrangement, StudyDesign, parse_factor
@@ -76,13 +76,13 @@ def _whole(word: str) -> int:
 
 def _executor(word: str) -> str:
     if word not in _EXECUTORS[:-1] and not (word.startswith("dask:") and len(word) > len("dask:")):
-        raise argparse.ArgumentTypeError(f"must be one of {', '.join(_EXECUTORS)}, not {word!r}")
+        raise argparse.ArgumentTypeError(f"unknown executor {word!r}; use one of {', '.join(_EXECUTORS)}")
     return word
 
 
 def _format(word: str) -> str:
     if word not in ("parquet", "npz"):
-        raise argparse.ArgumentTypeError(f"must be parquet or npz, not {word!r}")
+        raise argparse.ArgumentTypeError(f"unknown format {word!r}; use parquet or npz")
     return word
 
 
@@ -111,14 +111,14 @@ def run(options: argparse.Namespace) -> int:
 
 def _merged(options: argparse.Namespace) -> StudyResult:
     if len(options.words) < 2 or options.out is None:
-        raise UsageError("merge needs the folders of parts, and --out DIR")
+        raise UsageError("folders of parts or --out are missing; use jointfrf study merge PART... --out DIR")
     warn_of_ignored(options, _OF_COMPUTING, "merge computes nothing")
     return merge_studies(options.words[1:], options.out)
 
 
 def _studied(options: argparse.Namespace, is_part: bool) -> StudyResult:
     if len(options.words) > 1:
-        raise UsageError(f"one case at a time, not {' and '.join(options.words)}")
+        raise UsageError(f"several cases are given, {listed(options.words)}; name one")
     (case,) = options.words
     factors = _factors(options.factor)
     try:
@@ -148,14 +148,14 @@ def _factors(words: list[str]) -> dict[str, Any]:
         except ValueError as error:
             raise UsageError(f"--factor: {error}") from error
         if name in factors:
-            raise UsageError(f"--factor: {name} is given twice")
+            raise UsageError(f"--factor: {name} is given twice; give it once")
         factors[name] = values
     return factors
 
 
 def _range(options: argparse.Namespace) -> range:
     if options.first is None or options.count is None:
-        raise UsageError("--first and --count belong together")
+        raise UsageError("only one of --first and --count is given; give both")
     return range(options.first, options.first + options.count)
 
 
@@ -175,7 +175,9 @@ def _started(word: str, jobs: int | None) -> Iterator[AnyExecutor | None]:
     elif word == "mpi":
         futures, rank = import_extra("mpi4py.futures"), import_extra("mpi4py.MPI").COMM_WORLD.Get_rank()
         if rank:
-            raise UsageError("--executor mpi: start it as mpiexec -n N python -m mpi4py.futures -m jointfrf study ...")
+            raise UsageError(
+                "--executor mpi needs a launcher; start mpiexec -n N python -m mpi4py.futures -m jointfrf study ..."
+            )
         with futures.MPIPoolExecutor() as pool:
             yield pool
     elif word.startswith("dask:"):

@@ -176,9 +176,9 @@ def check_folder(option: str, path: Path | None) -> None:
         There is no such folder, or the path is a folder.
     """
     if path is not None and not path.parent.is_dir():
-        raise UsageError(f"{option}: there is no folder {path.parent}")
+        raise UsageError(f"{option}: folder {path.parent} does not exist; create it, or name another file")
     if path is not None and path.is_dir():
-        raise UsageError(f"{option}: {path} is a folder, not a file")
+        raise UsageError(f"{option}: {path} is a folder; name a file")
 
 
 def check_out(option: str, path: Path | None) -> None:
@@ -192,13 +192,13 @@ def check_out(option: str, path: Path | None) -> None:
     above = [] if path is None else [path, *path.parents]
     there = next((one for one in above if one.exists() or one.is_symlink()), None)
     if there is not None and not there.is_dir():
-        raise UsageError(f"{option}: {there} is a file, not a folder")
+        raise UsageError(f"{option}: {there} is a file; name a folder")
 
 
 def positive(word: str, least: int = 1) -> int:
     """Return a whole number of at least 1, or another least one."""
     if not word.isdecimal() or int(word) < least:
-        raise argparse.ArgumentTypeError(f"must be a whole number, at least {least}, not {word!r}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no whole number of at least {least}; give one")
     return int(word)
 
 

@@ -80,8 +80,8 @@ def _shared(measured: FrfSet, assembly: FrfSet) -> tuple[FrfSet, list[str]]:
     unused = list(dict.fromkeys(str(c) for side in sides for c in side if (c.node, c.axis) not in known))
     if not rows or not columns:
         raise FileContentError(
-            f"{measured.source} and the parts share no {'response' if not rows else 'excitation'}: nodes of B are "
-            "renumbered by --renumber-b N"
+            f"{measured.source} and the parts share no {'response' if not rows else 'excitation'}; renumber the nodes "
+            "of B by --renumber-b N"
         )
     own = replace(
         measured,

@@ -160,16 +160,22 @@ def pooled_parameter(
     unusable = [plan.labels[i] for i, one in found if not _is_closed(one)]
     if unusable:
         where = ", ".join(unusable)
-        text = f"{name} is open (rigid, free, or without an interval) in {where}: mean and spread are of the others"
+        text = f"{name} has an unbounded interval in {where}; mean and spread are from the other fits"
         findings.append(warn("left out", text, (name,)))
     at = np.array([i for i, one in found if _is_closed(one)], dtype=np.intp)
     used = tuple(one for _, one in found if _is_closed(one))
     if len(used) < 2:
-        findings.append(warn("left out", f"{name} is known from {len(used)} of the fits: not pooled", (name,)))
+        findings.append(
+            warn(
+                "left out",
+                f"{name} is not pooled: only {len(used)} of the fits determine it; give at least two",
+                (name,),
+            )
+        )
         return None, findings
     is_log = all(_is_positive(one) for one in used)
     if not is_log:
-        text = f"{name} is not significantly above zero in some fit: averaged as it is, not by its logarithm"
+        text = f"{name} is not significantly above zero in some fit; its values are averaged, not their logarithms"
         findings.append(note("averages", text, (name,)))
     names, effects = _random_effects(used, at, is_log, plan)
     outlying = _outlying(effects, names, tuple(plan.labels[i] for i in at))
@@ -203,12 +209,14 @@ def _random_effects(
     columns = [np.ones(at.size)]
     for name, numbers in plan.trends.items():
         if is_log and (numbers[at] <= 0).any():
-            raise ValueError(f"the trend over {one_line(name)} is a power law: its numbers must be above zero")
+            raise ValueError(f"the trend over {one_line(name)} is a power law; give numbers above zero")
         shown = np.log(numbers[at]) if is_log else numbers[at]
         columns.append(shown - shown.mean())
     design = np.column_stack(columns)
     if np.linalg.matrix_rank(design) < len(columns) or len(columns) >= at.size:
-        raise ValueError(f"{at.size} fits cannot determine a mean and {len(columns) - 1} trends")
+        raise ValueError(
+            f"{at.size} fits cannot determine a mean and {len(columns) - 1} trends; give more fits or fewer trends"
+        )
     names, factors = list[str](), list[NDArray[np.intp]]()
     for name, codes in plan.groups.items():
         group = np.unique(codes[at], return_inverse=True)[1].astype(np.intp)
@@ -273,20 +281,25 @@ def shown_chance(p_value: float) -> str:
     return f"{p_value:.2g}" if p_value >= 1e-4 else "< 1e-4"
 
 
+def _p_value(p_value: float) -> str:
+    shown = shown_chance(p_value)
+    return shown if shown.startswith("<") else f"= {shown}"
+
+
 def _findings(pooled: PooledParameter) -> list[Finding]:
     found = []
     if pooled.outlying:
         text = (
-            f"{pooled.name} of {', '.join(pooled.outlying)} does not belong to the others (chance below "
-            f"{100 * _SIGNIFICANT:g} % among {len(pooled.labels)}): look at it before using mean and spread"
+            f"{pooled.name} of {', '.join(pooled.outlying)} is an outlier (p < {_SIGNIFICANT:g} among "
+            f"{len(pooled.labels)} fits); check the test before you use mean and spread"
         )
         found.append(warn("outlying", text, (pooled.name,)))
     for one in pooled.spreads:
         if one.p_value < _SIGNIFICANT and one.factor not in (ASSEMBLY, _REPEAT):
-            text = f"{pooled.name} depends on {one.factor} (chance of this without: {shown_chance(one.p_value)})"
+            text = f"{pooled.name} depends on {one.factor} (p {_p_value(one.p_value)})"
             found.append(note("factor", text, (pooled.name,)))
     for trend in pooled.trends:
         if trend.p_value < _SIGNIFICANT:
-            text = f"{pooled.name} changes with {trend.factor} (chance of this without: {shown_chance(trend.p_value)})"
+            text = f"{pooled.name} changes with {trend.factor} (p {_p_value(trend.p_value)})"
             found.append(note("factor", text, (pooled.name,)))
     return found

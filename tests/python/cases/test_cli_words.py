@@ -41,8 +41,8 @@ def _elsewhere(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["identfy"], "there is no command 'identfy'; did you mean identify?"),
-        (["nothing"], "there is no command 'nothing': jointfrf --help lists them"),
+        (["identfy"], "unknown command 'identfy'; did you mean identify?"),
+        (["nothing"], "unknown command 'nothing'; see jointfrf --help"),
         (["identify", "a.uff", "--dof", "y"], "unknown option --dof; did you mean --dofs?"),
         (["identify", "a.uff", "--qiet"], "unknown option --qiet; did you mean --quiet?"),
         (["identify", "a.uff", "--damping=viscos"], "unknown value 'viscos'; use one of none, viscous"),
@@ -51,9 +51,9 @@ def _elsewhere(tmp_path, monkeypatch):
         (["check", "a.uff", "--dofs", "thetax,tz"], "not 'tz'"),
         (["check", "a.uff", "--dofs", "theta_q"], "did you mean theta_"),
         (["check", "a.uff", "--j", "5:3"], "'5:3' is no node number or range"),
-        (["check", "a.uff", "--j", "1:9999999"], "are more than 100000 nodes"),
-        (["check", "a.uff", "--config", "no.toml"], "--config: there is no file no.toml"),
-        (["check", "a.uff", "--force-quantity"], "--force-quantity needs --quantity"),
+        (["check", "a.uff", "--j", "1:9999999"], "are too many nodes; name at most 100000"),
+        (["check", "a.uff", "--config", "no.toml"], "--config: file no.toml does not exist"),
+        (["check", "a.uff", "--force-quantity"], "--force-quantity without a quantity"),
         (["completion", "bsh"], "did you mean bash?"),
         (["cases", "--key"], "did you mean --keys?"),
         ([], "identify a joint from measured FRFs"),
@@ -137,7 +137,7 @@ def test_quiet_prints_warnings(monkeypatch):
             "--damping and --cross have no effect",
         ),
         (["--at", "0.5,0,0", "--bending-stiffness", "1"], "--bending-stiffness has no effect: no rotation is found"),
-        (["--element", "7"], "--element has no effect: it is for cards"),
+        (["--element", "7"], "--element has no effect: no cards are written"),
     ],
 )
 def test_options_without_effect_are_named(words, warning):
@@ -195,8 +195,8 @@ def _structures(structures, tmp_path):
         (["decouple", *PARTS, "c.npz", "--equation", "rr", "--j", "3", "--k", "1", "--dofs", "x", "--r", "2:x", "--s",
           "2:x", "--renumber-b", "100"], "--s has no effect: equation rr does not use it"),
         (["pool", "fit.json", "again.json", "--transfer", "--output", "p.csv", "--trend", "m"],
-         "--trend and --output have no effect: it is of the pool"),
-        (["identify", BARS, *JOINT, "--save-lines"], "--save-lines has no effect: it is for --save"),
+         "--trend and --output have no effect: --transfer only tests"),
+        (["identify", BARS, *JOINT, "--save-lines"], "--save-lines has no effect: nothing is saved without --save"),
         (["export", "joint.toml", "abaqus:1,2", "--frequency", "5"], "--frequency has no effect: no law"),
     ],
 )  # fmt: skip
@@ -284,6 +284,25 @@ def test_an_interrupt_leaves_the_tests_that_are_finished(monkeypatch):
     assert result == (130, "", "jointfrf: error: interrupted\n")
 
 
+def test_an_interrupt_leaves_the_methods_that_are_finished(monkeypatch):
+    from jointfrf.cli import identify as command
+
+    fit = command._fit
+
+    def compliance_only(args, method, *rest):
+        if method != "compliance":
+            raise KeyboardInterrupt
+        return fit(args, method, *rest)
+
+    monkeypatch.setattr(command, "_fit", compliance_only)
+    words = ["identify", BARS, *JOINT, "--save", "fit.json", "--report", "fit.html"]
+    result = run_command(*words, "--method", "compliance,inverse-substructuring")
+    assert (result.returncode, result.stderr.splitlines()[-1]) == (130, "jointfrf: error: interrupted")
+    assert result.stdout.splitlines()[-2:] == ["wrote fit.json", "wrote fit.html"]
+    result = run_command(*words[:1], BARS, *JOINT, "--save", "other.json", "--method", "inverse-substructuring")
+    assert (result.returncode, Path("other.json").exists()) == (130, False)
+
+
 @pytest.mark.usefixtures("_models")
 def test_levels_and_pool_name_files_that_fail(monkeypatch):
     from jointfrf.cli import levels as command
@@ -305,11 +324,11 @@ def test_levels_and_pool_name_files_that_fail(monkeypatch):
     Path("again.json").write_text("{")
     result = run_command("pool", "fit.json", "again.json", "third.json", "fourth.json", "--factor", "day=1,1,2,2")
     assert result.returncode == 1
-    assert result.stderr.splitlines()[-1].startswith("jointfrf: error: again.json: ")
+    assert result.stderr.splitlines()[-1].startswith("jointfrf: error: again.json ")
     assert "k_y" in result.stdout
     result = run_command("pool", "fit.json", "again.json")
     assert (result.returncode, result.stdout) == (1, "")
-    assert "again.json: " in result.stderr
+    assert "again.json is no file of a joint" in result.stderr
     result = run_command("pool", "fit.json", "third.json", "--factor", "day=1,1,2")
     assert "--factor day has 3 groups; give 2, one for each file" in result.stderr
 
@@ -317,11 +336,11 @@ def test_levels_and_pool_name_files_that_fail(monkeypatch):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--model", "m.toml", "--window-decay", "3"], "--window-decay are of fits without models"),
-        (["--out", "fit.txt"], "--out: fit.txt is a file, not a folder"),
-        (["--out", "fit.txt/deep"], "--out: fit.txt is a file, not a folder"),
-        (["--report", "."], "--report: . is a folder, not a file"),
-        (["--report", "fit.txt/page.html"], "--report: fit.txt is a file, not a folder"),
+        (["--model", "m.toml", "--window-decay", "3"], "--window-decay are for fits without models"),
+        (["--out", "fit.txt"], "--out: fit.txt is a file; name a folder"),
+        (["--out", "fit.txt/deep"], "--out: fit.txt is a file; name a folder"),
+        (["--report", "."], "--report: . is a folder; name a file"),
+        (["--report", "fit.txt/page.html"], "--report: fit.txt is a file; name a folder"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_done_is_said_before_a_file_is_read(tmp_path, words, message):
@@ -390,7 +409,7 @@ def test_paths_through_a_link_mean_what_the_system_means(tmp_path, monkeypatch):
         ({"h": np.ones((2, 2, 2)), "freq_hz": [1.0, 2.0], "more": 1}, [], "give --map axes=, such as freq,out,in"),
         ({"y": 1}, [], "has several fields for h: say which of h, y by --map"),
         ({"responses": None}, [], "the responses are not named: give them, such as 102:+y"),
-        ({}, ["--map", "axis=3"], "'axis=3' is not FIELD=NAME with a field out of"),
+        ({}, ["--map", "axis=3"], "'axis=3' is not FIELD=NAME; use a field of"),
         ({}, ["--limit-gb", "1e-9"], ": --limit-gb or the environment variable"),
     ],
 )
@@ -590,8 +609,8 @@ def test_the_command_line_wins(tmp_path):
         ('"viscous"', '"viscos"', "[identify]: damping: unknown value 'viscos'; use one of none, viscous"),
         ("[101, 102]", "[0]", "jointfrf.toml: j: '0' is no node number"),
         ('"y", "theta_z"', '"y", "theta_"', "dofs: dofs must be among"),
-        ("[20, 100]", "[20]", "band: '20' is not a band like 200:550"),
-        ('quantity = "accelerance"', "quantity = 2020-01-01", "quantity: must be a text, a number or a list"),
+        ("[20, 100]", "[20]", "band: '20' is no band; use the form 200:550"),
+        ('quantity = "accelerance"', "quantity = 2020-01-01", "is no option value; write a text, a number or a list"),
         ("[identify]", "[identify", "not a TOML file"),
         ("[identify]", "identify = 3\n[run]", "identify must be a table"),
     ],
@@ -624,7 +643,10 @@ def test_a_file_that_is_found_writes_nothing(tmp_path, monkeypatch, said, key):
     (folder / "jointfrf.toml").write_text(f"{PROJECT}{said}\n")
     result = run_command("identify", BARS)
     assert result.returncode == 1
-    assert f"[identify]: {key}: say it on the command line, or name the file by --config" in result.stderr
+    assert (
+        f"[identify]: {key}: not taken from a jointfrf.toml in the working directory; give it on the command line"
+        in result.stderr
+    )
     assert sorted(each.name for each in tmp_path.rglob("*")) == ["jointfrf.toml", "stranger"]
 
 
@@ -633,9 +655,9 @@ def test_a_file_that_is_found_names_no_executor(tmp_path):
     Path("jointfrf.toml").write_text('[study]\nexecutor = "dask:tcp://127.0.0.1:9"\n')
     result = run_command("study", "4.2", "--realisations", "2")
     assert result.returncode == 1
-    assert "[study]: executor: say it on the command line" in result.stderr
+    assert "[study]: executor: not taken from a jointfrf.toml" in result.stderr
     Path("jointfrf.toml").write_text("json = true\n")
-    assert "json: say it on the command line" in run_command("cases").stderr
+    assert "json: not taken from a jointfrf.toml" in run_command("cases").stderr
     Path("jointfrf.toml").write_text('export = "abaqus:1,2"\n')
     assert "export must be a table" in run_command("cases").stderr
 
@@ -651,7 +673,7 @@ def test_a_file_that_is_found_reads_nothing_outside_its_folder(tmp_path, monkeyp
     (folder / "jointfrf.toml").write_text(f'channels = "{name}"\nat = [0, 0, 0]\n')
     result = run_command("check", BARS)
     assert result.returncode == 1
-    assert f"channels: {name} is not in the folder of this file, which was found and not named" in result.stderr
+    assert f"channels: {name} is not in the folder of this file; name the file by --config" in result.stderr
     named = run_command("check", BARS, "--config", "jointfrf.toml")
     assert "is not in the folder" not in named.stderr
 
@@ -659,7 +681,7 @@ def test_a_file_that_is_found_reads_nothing_outside_its_folder(tmp_path, monkeyp
 def test_a_wrong_value_of_a_file_that_is_named():
     Path("own.toml").write_text("quiet = 1\n")
     result = run_command("check", BARS, "--config", "own.toml")
-    assert "quiet: must be true or false, not 1" in result.stderr
+    assert "quiet: 1 is no switch; write true or false" in result.stderr
 
 
 def test_the_limit_of_what_is_read_is_an_option(tmp_path, monkeypatch):
@@ -788,7 +810,7 @@ def test_every_command_that_takes_long_prints_its_stage(monkeypatch, capsys, qui
 def test_a_list_of_methods_names_one():
     result = run_command("identify", BARS, *JOINT, "--method", ",")
     assert result.returncode == 2
-    assert "argument --method: ',' is not one of compliance, inverse-substructuring" in result.stderr
+    assert "argument --method: unknown method ','; use one of compliance, inverse-substructuring" in result.stderr
 
 
 def test_a_message_is_one_line_whatever_a_file_is_called():
