@@ -330,7 +330,7 @@ def _of_fit(one: _Followed, label: str) -> list[Finding]:
 
 def _words(dof: str, bend: Bend) -> str:
     """State that K* of a test changes with amplitude as no fit follows."""
-    return f"K* of amplitude-dependent {dof} is no smooth function of ln a (p = {bend.p_value:.1g})"
+    return f"K* of {dof} depends on amplitude and is no smooth function of ln a (p = {bend.p_value:.1g})"
 
 
 def _level(one: _Followed, dof: str, label: str, share: float) -> JointLevel:

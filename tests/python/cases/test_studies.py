@@ -259,7 +259,11 @@ def test_command_says_what_the_study_holds(reference, tmp_path):
         (["merge", "somewhere", "--out", "there"], 1, "somewhere holds no study"),
         (["3.1", "--estimator", "compliances"], 1, "no estimator 'compliances'; did you mean compliance?"),
         (["3.1", "--noise", "6 %"], 1, "the case has no noise '6 %'"),
-        (["3.1", "--executor", "dusk"], 2, "must be one of processes, threads, loky, mpi, dask:ADDRESS, not 'dusk'"),
+        (
+            ["3.1", "--executor", "dusk"],
+            2,
+            "unknown executor 'dusk'; use one of processes, threads, loky, mpi, dask:ADDRESS",
+        ),
         (["3.1", "--values", "csv"], 2, "unknown format 'csv'; use parquet or npz"),
     ],
 )

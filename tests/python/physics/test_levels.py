@@ -289,7 +289,7 @@ def test_a_backbone_that_does_not_fit_its_assembly_is_an_error(believed_beam):
     good = jf.Backbone("A/1:y", **points, damping=[0.001])
     for backbone, options, text in (
         (jf.Backbone("A/99:y", **points, damping=[0.001]), {}, "channel 'A/99:y'"),
-        (good, {"dof": "theta_y"}, "dof must be one of theta_z, not 'theta_y'"),
+        (good, {"dof": "theta_y"}, "dof is 'theta_y'; use one of theta_z"),
         (good, {"laws": ["voigt"]}, "laws"),
     ):
         with pytest.raises(ValueError, match=text):
