@@ -90,7 +90,8 @@ def _run_each(args: argparse.Namespace) -> int:
                 fits[stem], content, paths = _one(_for_one(args, path, stem), out)
                 contents.append(content)
                 written += paths
-            result = _summary(fits[stem]) if stem in fits else "failed"
+            with waiting(f"intervals of {path.name}"):
+                result = _summary(fits[stem]) if stem in fits else "failed"
             out.say(f"{stem} ({done + 1} of {total}): {result}")
     if fits:
         found = [f"{stem}: {text}" for stem, fit in fits.items() for text in fit.warnings]

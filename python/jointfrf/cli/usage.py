@@ -35,7 +35,6 @@ __all__ = [
     "sentence",
     "shown_progress",
     "shown_warnings",
-    "time_left",
     "waiting",
     "warn_of_ignored",
 ]
@@ -207,7 +206,7 @@ class _Stage:
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.start = self._counted_from = time.monotonic()
+        self.start = self._counted_from = self._counted_at = time.monotonic()
         self._done, self._total = 0, 0
 
     def count(self, done: int, total: int) -> None:
@@ -216,8 +215,9 @@ class _Stage:
         Calls may come from several threads, in another order than their counts: progress is never taken back.
         """
         with _LOCK:
+            self._counted_at = time.monotonic()
             if done == total:
-                self._counted_from, self._done, self._total = time.monotonic(), 0, 0
+                self._counted_from, self._done, self._total = self._counted_at, 0, 0
             elif done * self._total >= self._done * total:
                 self._done, self._total = done, total
 
@@ -230,7 +230,8 @@ class _Stage:
         """Return the finished share and the time left."""
         if self.share is None:
             return ""
-        return f", {100 * self.share:.0f} %{time_left(now - self._counted_from, self._done, self._total)}"
+        spent = self._counted_at - self._counted_from
+        return f", {100 * self.share:.0f} %{_time_left(spent, now - self._counted_at, self._done, self._total)}"
 
 
 #: The stages under way, each within the one before it.
@@ -314,11 +315,11 @@ def waiting(stage: str) -> Iterator[Callable[[int, int], None]]:
             _STAGES.remove(found)
 
 
-def time_left(spent: float, done: int, total: int) -> str:
-    """Return the time left at the speed so far, if that is known."""
+def _time_left(spent: float, since: float, done: int, total: int) -> str:
+    """Return the time left at the speed until the last count, some time since; nothing before the first count."""
     if done == 0 or spent < _SETTLED:
         return ""
-    left = spent * (total - done) / done
+    left = max(0.0, spent * (total - done) / done - since)
     return f", about {left:.0f} s left" if left < 90 else f", about {left / 60:.0f} min left"
 
 

@@ -765,7 +765,7 @@ def test_progress_has_stage_time_share_and_time_left(monkeypatch):
         count(1, 4)
         with usage.waiting("fit of a.uff"):
             clock.now = 20.0
-            assert clock.text() == "fit of a.uff: 10 s, 25 %, about 60 s left"
+            assert clock.text() == "fit of a.uff: 10 s, 25 %, about 20 s left"  # 10 s for each test, 10 s have passed
         count(2, 4)
         assert clock.text(bar=True) == "[##########----------] tests: 20 s, 50 %, about 20 s left"
         count(1, 4)  # of another thread, later
