@@ -188,7 +188,7 @@ def fit_amplitude_laws(
     )  # fmt: skip
     eta = as_real("loss_factor", loss_factor, (a.size,))
     if (np.abs(eta) > _MOST).any():
-        raise ValueError(f"loss_factor must lie within {_MOST:g}, but is {eta[np.argmax(np.abs(eta))]:g}")
+        raise ValueError(f"loss_factor is {eta[np.argmax(np.abs(eta))]:g}; give values within +-{_MOST:g}")
     chosen = dict.fromkeys(as_names("laws", laws))
     for law in chosen:
         check_choice("laws", law, AMPLITUDE_LAWS)
@@ -201,7 +201,9 @@ def fit_amplitude_laws(
         else:
             fits.append(_fit(law, a, k, eta, dk / k, d_eta, share))
     if not fits:
-        raise ValueError(f"amplitude has {a.size} levels, too few for the laws {', '.join(chosen) or '(none)'}")
+        raise ValueError(
+            f"{a.size} levels are too few for the laws {', '.join(chosen) or '(none)'}; give more levels or fewer laws"
+        )
     return AmplitudeLawFits(tuple(sorted(fits, key=lambda one: one.aicc)), left_out)
 
 
@@ -210,7 +212,7 @@ def _positive(name: str, value: ArrayLike, size: int | None) -> FloatArray:
     bad = np.flatnonzero(~((array >= _LEAST) & (array <= _MOST)))
     if bad.size:
         where = f"is {array[bad[0]]:g} at level {bad[0]}"
-        raise ValueError(f"{name} must be positive, between {_LEAST:g} and {_MOST:g}, but {where}")
+        raise ValueError(f"{name} {where}; give values between {_LEAST:g} and {_MOST:g}")
     return array
 
 

@@ -78,21 +78,21 @@ class Backbone:
         check_type("channel", self.channel, str)
         freq = as_real("freq_hz", self.freq_hz, (None,))
         if (self.damping is None) == (self.force is None):
-            raise ValueError("give either damping, or force, of tests at phase resonance")
+            raise ValueError("damping and force are both given, or neither; give one of them")
         for name in ("freq_hz", "amplitude", "damping", "force"):
             value = getattr(self, name)
             if value is not None:
                 own = as_real(name, value, (freq.size,))
                 if not own.size or (own <= 0).any():
-                    raise ValueError(f"{name} must hold positive numbers")
+                    raise ValueError(f"{name} has no numbers or one that is not positive; give positive numbers")
                 object.__setattr__(self, name, own)
         if self.damping is not None and (self.damping >= 1).any():
-            raise ValueError("damping must hold ratios below 1")
+            raise ValueError("damping has a ratio of 1 or more; give ratios below 1")
         for name in ("freq_error", "damping_error"):
             object.__setattr__(self, name, float(as_probability(name, getattr(self, name))))
         named = tuple(self.labels) if self.labels else tuple(str(i) for i in range(1, freq.size + 1))
         if len(named) != freq.size or not all(isinstance(one, str) for one in named):
-            raise ValueError(f"labels must name {freq.size} points, not {one_line(self.labels)}")
+            raise ValueError(f"labels are {one_line(self.labels)}; give {freq.size} names, one for each point")
         object.__setattr__(self, "labels", named)
 
 
@@ -155,13 +155,15 @@ def backbone_levels(
     share, chosen, own = as_probability("probability", probability), check_laws(laws), _dof(whole, dof)
     for name, part in (("A", whole.a), ("B", whole.b)):
         if isinstance(part.source, FrfSource):
-            raise ValueError(f"{name} is given by FRFs: a backbone needs models of both parts")
+            raise ValueError(f"{name} is given by FRFs; give models of both parts for a backbone")
     whole.check([backbone.channel], "channel")
     with np.errstate(all="ignore"):  # what is not finite is looked for
         points, findings = _points(whole, backbone, own), list[Finding]()
     for one, label in zip(points, backbone.labels, strict=True):
         if not np.isfinite([one.k, one.motion, *one.errors]).all():
-            raise ValueError(f"point {label}: no finite K* of {own} gives this frequency, amplitude and damping")
+            raise ValueError(
+                f"point {label}: no finite K* of {own} gives this frequency, amplitude and damping; check the models"
+            )
     found = [_level(one, label, share) for one, label in zip(points, backbone.labels, strict=True)]
     loose = [name for name, std, _ in _unknowns(whole) if std is None]
     if loose:
@@ -179,7 +181,7 @@ def _dof(whole: Assembly, dof: str | None) -> str:
         return known[0]
     if not isinstance(dof, str) or dof not in known:
         hint = did_you_mean(dof, known) if isinstance(dof, str) else ""
-        raise ValueError(f"dof must be one of {', '.join(known)}, not {one_line(dof)}{hint}")
+        raise ValueError(f"dof is {one_line(dof)}; use one of {', '.join(known)}{hint}")
     return dof
 
 

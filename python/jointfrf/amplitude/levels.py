@@ -149,7 +149,7 @@ def levels(
     ------
     ValueError
         Numbers of fits, drives and labels that differ; a fit without FRFs; a drive that does not belong to its fit; a
-        joint without springs; every test bent by amplitude.
+        joint without springs; no test whose FRFs follow the amplitude.
 
     Notes
     -----
@@ -160,7 +160,7 @@ def levels(
     Where the amplitude changes over the lines by more than 1 %, fits with models are made again with K* linear in
     ln a, of the second and third power where these show (chance below 5 %, by the residual projected on dH/dK* times
     the next power beside all parameters); values are those at the amplitude of the level. Where that is not enough
-    (chance below 1e-4), or there are no models, the FRF is bent by amplitude, and the test is left out.
+    (chance below 1e-4), or there are no models, the test is left out.
 
     Examples
     --------
@@ -188,7 +188,7 @@ def levels(
         except ValueError as error:
             raise ValueError(f"{label}: {error}") from error
         if not one.lines:
-            raise ValueError(f"{label}: no DOF of the joint is a spring whose stiffness was found")
+            raise ValueError(f"{label}: no joint DOF is a spring with a stiffness; use a law spring for one DOF")
         if one.rejected:
             refused[label] = "; ".join(each.text for each in one.rejected)
             findings += [replace(each, test=label) for each in one.rejected]
@@ -255,12 +255,14 @@ def _secant(found: Mapping[str, Sequence[JointLevel]], label: str, around: LawJo
 def _labels(fits: Sequence[Fit], drives: Sequence[Drive], labels: Sequence[str] | None) -> tuple[str, ...]:
     for name, own, kind in (("fits", fits, Fit), ("drives", drives, Drive)):
         if not isinstance(own, Sequence) or not all(isinstance(one, kind) for one in own):
-            raise TypeError(f"{name} must be a sequence of {kind.__name__}")
+            raise TypeError(f"{name} has a wrong type; give a sequence of {kind.__name__}")
     if not fits or len(fits) != len(drives):
-        raise ValueError(f"fits and drives must be as many, at least one, not {len(fits)} and {len(drives)}")
+        raise ValueError(
+            f"{len(fits)} fits and {len(drives)} drives; give one drive for each fit, and at least one fit"
+        )
     named = tuple(f"level {i}" for i in range(1, len(fits) + 1)) if labels is None else as_names("labels", labels)
     if len(named) != len(fits) or len(set(named)) < len(named):
-        raise ValueError(f"labels must name each of the {len(fits)} fits, each another one")
+        raise ValueError(f"wrong labels; give {len(fits)} different names, one for each fit")
     return named
 
 

@@ -61,7 +61,11 @@ class Drive:
         object.__setattr__(self, "level", as_positive("level", self.level))
         check_type("channel", self.channel, str)
         if (self.held == "force") == bool(self.channel):
-            what = "a force names no channel" if self.channel else "channel must name what was held"
+            what = (
+                "a force has no channel; leave it out"
+                if self.channel
+                else "channel is empty; name the controlled channel"
+            )
             raise ValueError(f"{what}: {one_line(self.channel)}")
 
     def __str__(self) -> str:
@@ -211,7 +215,7 @@ def lines_of_fit(fit: Fit, drive: Drive) -> dict[str, DofLines]:
     for dof, own in motion.sources.items():
         amplitude = abs(motion.per_force[:, fit.dofs.index(dof)]) * force
         if not (amplitude > 0).all():
-            raise ValueError(f"{dof}: the drive does not move this DOF of the joint on all lines")
+            raise ValueError(f"{dof}: the drive does not move this joint DOF on all lines; use another drive or band")
         weights = own.weights()
         omega = float(np.sum(abs(weights[1]) * fit.freq_hz[:, None]) / abs(weights[1]).sum() * 2 * np.pi)
         found[dof] = DofLines(amplitude, weights, omega, own)
@@ -234,11 +238,13 @@ def _force(fit: Fit, drive: Drive, motion: _Motion) -> FloatArray:
     names = fit.dofs if drive.held == "joint" else motion.names
     if drive.channel not in names:
         hint = did_you_mean(drive.channel, names)
-        raise ValueError(f"{one_line(drive.channel)} was held, but the fit has only {', '.join(names)}{hint}")
+        raise ValueError(
+            f"the fit has no {one_line(drive.channel)}, which was controlled; use one of {', '.join(names)}{hint}"
+        )
     row = names.index(drive.channel)
     size = abs((motion.per_force if drive.held == "joint" else motion.predicted)[:, row])
     if not (size > 0).all():
-        raise ValueError(f"{drive.channel} was held, but does not move on all lines")
+        raise ValueError(f"{drive.channel} was controlled, but does not move on all lines; name another channel")
     power = 0 if drive.held == "joint" else drive.power
     found: FloatArray = drive.level / (2 * np.pi * fit.freq_hz[:, None]) ** power / size
     return found
@@ -344,11 +350,9 @@ def _model_lines(fit: Fit, data: ModelData) -> _Motion:
 def _joint_lines(fit: Fit) -> _Motion:
     data = fit.data
     if not isinstance(data, FitData):
-        raise ValueError(
-            "the fit has no FRFs behind it: one that was loaded cannot say at which amplitude it was found"
-        )
+        raise ValueError("the fit was loaded without its FRFs; fit the FRFs again")
     if data.modes is None:
-        raise ValueError("the transform does not say how channels move with the joint: name places, or the joint DOFs")
+        raise ValueError("the transform does not relate the channels to the joint; give positions or the joint DOFs")
     gamma, n = data.regenerated(slice(None)), len(fit.dofs)
     known = np.asarray(np.isfinite(gamma).all(axis=(1, 2)))
     gamma = np.where(known[:, None, None], gamma, np.nanmean(gamma, axis=0)) if not known.all() else gamma

@@ -20,7 +20,7 @@ from jointfrf.identification.model.assembly import AddedMass, Assembly, PlacedJo
 from jointfrf.identification.model.substructure import Unknown
 from jointfrf.identification.result import Fit, columns_of
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_type
-from jointfrf.spelling import did_you_mean
+from jointfrf.spelling import did_you_mean, some_of
 
 if TYPE_CHECKING:
     from jointfrf.report.sketch import SketchedPart
@@ -199,7 +199,7 @@ def measured_assembly(
     kept = in_bands(frfs.freq_hz, bands) if bands else np.ones(frfs.freq_hz.size, bool)
     kept = kept & (frfs.freq_hz > 0)
     if not kept.any():
-        raise FileContentError(f"{frfs.source} has no line above 0 Hz in the bands")
+        raise FileContentError(f"{frfs.source} has no line above 0 Hz in the bands; give other bands")
     freq = frfs.freq_hz[kept]
     parts = file.parts(freq)
     file, located = file.located(parts)
@@ -210,7 +210,7 @@ def measured_assembly(
             whose = "A or B" if "A" in parts else ", ".join(parts)
             first, channel = next(iter(parts)), (frfs.responses if what == "response" else frfs.excitations)[0]
             raise FileContentError(
-                f"{file.path}: no {what} of {frfs.source} is a DOF of {whose}: name them under [channels], such as "
+                f"{file.path}: no {what} of {frfs.source} is a DOF of {whose}; name them under [channels], such as "
                 f'"{channel}" = "{first}/{parts[first].keys.joint[0]}"'
             )
     names = tuple(dict.fromkeys([*rows, *columns]))
@@ -268,7 +268,7 @@ def _dofs(
         dof, sign = mapping.get(channel, ("", 1)) if given else _named_alike(parts, file, channel)
         if dof and dof in found:
             both = f"{channels[found[dof][0]]} and {channel}"
-            raise FileContentError(f"{file.path}: {both} of {frfs.source} are one DOF: {dof}")
+            raise FileContentError(f"{file.path}: {both} of {frfs.source} are one DOF, {dof}; give each its own DOF")
         if dof:
             found[dof] = (i, sign)
     return found
@@ -283,7 +283,7 @@ def _named_alike(parts: Mapping[str, AssemblyPart], file: AssemblyFile, channel:
         found += [f"{side}/{word}" for word in words if part.has(word)][:1]
     if len(found) > 1:
         raise FileContentError(
-            f"{file.path}: channel {channel} may be {' or '.join(found)}: name it under [channels], such as "
+            f"{file.path}: channel {channel} may be {' or '.join(found)}; name it under [channels], such as "
             f'"{channel}" = "{found[0]}"'
         )
     return (found[0], channel.sign) if found else ("", 1)
@@ -296,7 +296,7 @@ def _check_named(file: AssemblyFile, frfs: FrfSet) -> None:
         if Channel.parse(name) not in known:
             shown = [str(one) for one in dict.fromkeys((*frfs.responses, *frfs.excitations))]
             raise file.keys.table.table("channels").wrong(
-                name, f"{frfs.source} has no such channel, only {', '.join(shown[:12])}{did_you_mean(name, shown)}"
+                name, f"unknown channel of {frfs.source}; use one of {some_of(shown, 12)}{did_you_mean(name, shown)}"
             )
 
 
@@ -305,6 +305,6 @@ def _gains(file: AssemblyFile, name: str, dofs: dict[str, tuple[int, int]]) -> d
     for dof, prior in getattr(file.keys, name).items():
         table = file.keys.table.table(name)
         if dof not in dofs:
-            raise table.wrong(dof, f"there is no such channel, only {', '.join(dofs)}{did_you_mean(dof, dofs)}")
+            raise table.wrong(dof, f"unknown channel; use one of {', '.join(dofs)}{did_you_mean(dof, dofs)}")
         found[dof] = unknown_of(prior, 1.0, table, dof, -np.inf)
     return found

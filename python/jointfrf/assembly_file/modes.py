@@ -54,7 +54,7 @@ class ModalStructure(Structure):
         number = {dof: i for i, dof in enumerate(self.modes.dofs)}
         missing = [dof for dof in dofs if dof not in number]
         if missing:
-            raise ValueError(f"there is no DOF {missing[0]!r}{similar_dof(missing[0], number)}")
+            raise ValueError(f"unknown DOF {missing[0]!r}; use a DOF of the modes{similar_dof(missing[0], number)}")
         return [number[dof] for dof in dofs]
 
     def receptance(self, freq_hz: FloatArray, points: Sequence[str]) -> ComplexArray:
@@ -107,7 +107,7 @@ class ModesKeys(SubstructureKeys, tag="modes"):
         found = self.build(partial(read_modes, path), "file")
         dofs = self._names(found)
         if found.is_rigid.any() and found.modal_mass is None:
-            raise self.wrong("file", "complex modes at 0 Hz have no scale: leave them to the residuals")
+            raise self.wrong("file", "complex modes at 0 Hz have no scale; leave them out and add residuals")
         file = self._node_file(found)
         if self.nodes is not None and not found.has_nodes:  # those of the modes' own file are turned
             dofs = file.named(dofs)
@@ -125,16 +125,16 @@ class ModesKeys(SubstructureKeys, tag="modes"):
         given: tuple[str, ...] = found.dofs
         if self.dofs is not None:
             if found.dofs:
-                raise self.wrong("dofs", "the file names its DOFs itself: leave the key out")
+                raise self.wrong("dofs", "the file names its DOFs; leave out the key")
             own = self.dofs
             given = own if isinstance(own, tuple) else self.build(partial(read_dof_names, self.file_of("dofs")), "dofs")
         if not given:
-            raise self.missing(["dofs"], "the file does not name its DOFs")
+            raise self.missing(["dofs"], "the file does not name its DOFs; give their names")
         if len(given) != len(found.shapes):
-            raise self.wrong("dofs", f"{len(given)} names, and the file holds {len(found.shapes)} DOFs")
+            raise self.wrong("dofs", f"{len(given)} names; give {len(found.shapes)}, one for each DOF of the file")
         names = tuple(_named(dof) for dof in given)
         if len(set(names)) < len(names):
-            raise self.wrong("dofs", "a DOF is named twice")
+            raise self.wrong("dofs", "a DOF is named twice; name each DOF once")
         return names
 
     def _node_file(self, found: ModesFile) -> NodeFile:
@@ -155,7 +155,7 @@ class ModesKeys(SubstructureKeys, tag="modes"):
                 if row in names and column in names:
                     h[:, names.index(row), names.index(column)] = response.sign * force.sign * frfs.h[:, i, j]
         if not np.isfinite(h).all(axis=0).any():
-            raise self.wrong("residuals", f"{frfs.source} has no FRF between DOFs of the modes")
+            raise self.wrong("residuals", f"{frfs.source} has no FRF between DOFs of the modes; name another file")
         at, known = whole.index(names), np.isfinite(h).all(axis=0)
         modes = whole.modes.with_residuals(frfs.freq_hz, h, at)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -207,7 +207,7 @@ class AssemblyPart:
             meant["length_scale"] = "length"
         if "height" not in takes:
             if "thickness" in keys.unknown:
-                text = "K and M do not say what of them is a thickness: name E, which a section bends with"
+                text = "K and M contain no thickness; name E, to which bending is proportional"
                 raise keys.wrong("unknown", text)
             del meant["thickness"]
         return _by_name(keys.unknown, list(dict.fromkeys([*takes, *SCALES])), meant, keys.table)
@@ -226,7 +226,7 @@ class AssemblyPart:
         keys, numbers = self.keys, _numbers_of(self.keys)
         table = keys.table if isinstance(keys.table.content.get("unknown"), list) else keys.table.table("unknown")
         if name not in numbers and isinstance(prior, PriorKeys) and prior.mean is not None:
-            raise table.wrong(name, "it is a factor of the matrices, about 1: leave mean out")
+            raise table.wrong(name, "a factor of the matrices has mean 1; leave out mean")
         return unknown_of(prior, numbers.get(name, 1.0), table, name, -np.inf if name == "poisson" else 0.0)
 
 
@@ -252,7 +252,7 @@ def named_dof(part: AssemblyPart, dof: str) -> NamedDof:
     except ValueError:
         at = np.zeros(0)
     if at.shape != (3,) or not np.isfinite(at).all():
-        raise ValueError(f"{dof} must be a position and a direction, @x,y,z:y in m")
+        raise ValueError(f"{dof} is no position with a direction; use the form @x,y,z:y, in m")
     held = None
     if isinstance(part.structure, ModelStructure):
         held = {*part.structure.model.dofs, *getattr(part.structure.model, "shown", ())}
@@ -262,13 +262,13 @@ def named_dof(part: AssemblyPart, dof: str) -> NamedDof:
         if (f"{node}:{direction}" in held if held is not None else part.has(f"{node}:{direction}"))
     }
     if not nodes:
-        raise ValueError(f"{dof}: no node whose place is known has a DOF {direction}")
+        raise ValueError(f"{dof}: no node with coordinates has a DOF {direction}; use another direction")
     places = np.array(list(nodes.values()))
     away = np.linalg.norm(places - at, axis=1)
     nearest, size = int(np.argmin(away)), float(np.linalg.norm(np.ptp(places, axis=0)))
     if away[nearest] > size / 2:
         raise ValueError(
-            f"{dof}: the nearest node is {away[nearest]:.3g} m away, and the part is {size:.3g} m long: is it in m?"
+            f"{dof}: the nearest node is {away[nearest]:.3g} m away, more than half the part; give the position in m"
         )
     return NamedDof(f"{list(nodes)[nearest]}:{direction}", float(away[nearest]))
 
@@ -336,12 +336,12 @@ def _by_name(own: Unknowns, takes: Sequence[str], meant: Mapping[str, str], tabl
         name = meant.get(word, word)
         if name not in takes:
             named = [*takes, *(short for short, long in meant.items() if long in takes)]
-            text = f"{word}: there is no such number here, only {', '.join(named)}{did_you_mean(word, named)}"
+            text = f"unknown number {word}; use one of {', '.join(named)}{did_you_mean(word, named)}"
             raise table.wrong("unknown", text)
         if name in found:
-            raise table.wrong("unknown", f"{word}: {name} is named twice")
+            raise table.wrong("unknown", f"{word}: {name} is named twice; name it once")
         if isinstance(own, tuple) and name not in _USUAL:
-            raise table.wrong("unknown", f"{word}: it has no usual prior: write unknown = {{ {word} = 0.01 }}")
+            raise table.wrong("unknown", f"{word} has no default prior; write unknown = {{ {word} = 0.01 }}")
         found[name] = own[word] if isinstance(own, Mapping) else _USUAL[name]
     return found
 
@@ -389,7 +389,7 @@ def unknown_of(prior: Prior, value: float, table: TomlTable, name: str, lower: f
     """Return what is believed of a number; raises FileContentError."""
     if not isinstance(prior, PriorKeys):
         if value == 0:
-            raise table.wrong(name, "it is 0, so that a relative standard deviation says nothing: give { mean, std }")
+            raise table.wrong(name, "the value is 0 and has no relative standard deviation; give { mean, std }")
         return table.build(lambda: Unknown(value, prior * abs(value), lower), name)
     own = prior
     low, high = (lower if own.lower is None else own.lower), (np.inf if own.upper is None else own.upper)
@@ -473,7 +473,7 @@ class AssemblyFile:
             for law in laws if isinstance(laws, list) else ():
                 if _is_bare(law):
                     usual = ", ".join(f"{name} = ..." for name in start_values(law.get("law")))
-                    text = f"the law of {law.get('dof')} needs the values that are expected: values = {{ {usual} }}"
+                    text = f"the law of {law.get('dof')} has no expected values; add values = {{ {usual} }}"
                     raise self.keys.wrong(name, text)
 
     def attachments(self) -> tuple[Attachment, ...]:
@@ -555,14 +555,14 @@ def read_assembly_file(path: Path) -> AssemblyFile:
         for dof in (*one.j, *one.k):
             if dof.partition("/")[0] not in keys.parts:
                 begin = " or ".join(f"'{part}/'" for part in list(keys.parts)[:2])
-                raise keys.wrong("joints", f"{name}: no part has a DOF {dof!r}; names begin with {begin}")
+                raise keys.wrong("joints", f"{name}: no part has a DOF {dof!r}; use a name that begins with {begin}")
     parts = {name: _part_of(_inside(table, "parts", name), name, joints) for name in keys.parts}
     return AssemblyFile(keys, parts, None, joints, path)
 
 
 def _placed(keys: PlacedJointKeys) -> PlacedJoint:
     if (keys.law is None) == (keys.file is None):
-        raise keys.missing(["law"], "or file; one of them says what the joint is")
+        raise keys.missing(["law"], "law or file defines the joint")
     table = keys.table
     if keys.file is None:
         joint = _joint_of_table(TomlTable({"law": table.content["law"]}, table.where, table.folder))
@@ -574,11 +574,11 @@ def _placed(keys: PlacedJointKeys) -> PlacedJoint:
 def _part_of(table: TomlTable, name: str, joints: Mapping[str, PlacedJoint]) -> PartKeys:
     """Return the keys of one of several parts, with its DOFs at all joints."""
     if "joint" in table.content:
-        raise table.wrong("joint", "joints name the DOFs of their parts under [joints]: leave it out")
+        raise table.wrong("joint", "the DOFs of the joints are under [joints]; leave out the key")
     dofs = [dof.removeprefix(f"{name}/") for one in joints.values() for dof in (*one.j, *one.k)
             if dof.startswith(f"{name}/")]  # fmt: skip
     if not dofs:
-        raise table.wrong("joint", f"no joint names a DOF of {name}")
+        raise table.wrong("joint", f"no joint names a DOF of {name}; connect the part by a joint, or leave it out")
     content = {**table.content, "joint": list(dict.fromkeys(dofs))}
     keys: PartKeys = read_keys(TomlTable(content, table.where, table.folder), *get_args(PartKeys))
     return keys
@@ -618,4 +618,4 @@ def check_dofs(
         part, _, own = dof.partition("/")
         if part not in parts or not parts[part].has(own):
             begin = " or ".join(f"'{one}/'" for one in list(parts)[:2])
-            raise keys.wrong(name, f"{whose} a DOF {dof!r}; names begin with {begin}")
+            raise keys.wrong(name, f"{whose} a DOF {dof!r}; use a name that begins with {begin}")

@@ -81,7 +81,7 @@ def read_side(
     """
     part = read_part(path)
     if len(part.keys.joint) != n:
-        raise part.keys.wrong("joint", f"it must name the {n} DOFs of the joint, not {len(part.keys.joint)}")
+        raise part.keys.wrong("joint", f"{len(part.keys.joint)} DOFs; name the {n} DOFs of the joint")
     origin = part.places.get(part.keys.joint[0].rpartition(":")[0])
     found, moved = [], {}
     for own in (responses, forces):
@@ -113,8 +113,8 @@ def _node(part: AssemblyPart, channel: PlacedChannel, origin: FloatArray | None,
     if apart[nearest] > _FARTHEST:
         where = ", ".join(f"{1e3 * x:.4g}" for x in channel.position)
         raise FileContentError(
-            f"{path}: no node is at channel {channel.channel}, x, y, z = {where} mm from the joint; the nearest, "
-            f"{names[nearest]}, is {1e3 * apart[nearest]:.3g} mm away"
+            f"{path}: no node is at channel {channel.channel}, ({where}) mm from the joint; the nearest, "
+            f"{names[nearest]}, is {1e3 * apart[nearest]:.3g} mm away; correct the position"
         )
     return names[nearest], float(apart[nearest])
 
@@ -129,6 +129,6 @@ def _dof(part: AssemblyPart, node: str, channel: PlacedChannel, path: Path) -> M
     for direction in weights:
         if not part.has(f"{node}:{direction}"):
             raise FileContentError(
-                f"{path}: channel {channel.channel} needs the DOF {node}:{direction}, which is not there"
+                f"{path}: DOF {node}:{direction} of channel {channel.channel} is missing; add it to the model"
             )
     return {f"{node}:{direction}": weight for direction, weight in weights.items()}

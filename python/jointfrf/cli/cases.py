@@ -14,7 +14,8 @@ __all__ = ["add_arguments", "run"]
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = "List the cases that come with jointfrf."
-    parser.option("--keys", "instead: print all keys of case.toml and expected.toml (Markdown)")
+    parser.examples.append("jointfrf cases")
+    parser.option("--keys", "print all keys of case.toml and expected.toml (Markdown) instead")
 
 
 def run(options: argparse.Namespace) -> int:

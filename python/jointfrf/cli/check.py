@@ -9,7 +9,7 @@ from jointfrf.channels.check.result import FrfCheck
 from jointfrf.cli.measured_file import add_file_arguments, file_names, in_some_band, read_measured
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output
+from jointfrf.cli.usage import Output, waiting
 
 __all__ = ["add_arguments", "check_joint", "run"]
 
@@ -21,11 +21,15 @@ _OF_JOINT = ("j", "k", "dofs", "at", "at_k", "channels", "spacing", "axis")
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Look at measured FRFs: what the file holds; quantity, time convention, sign, gain, delay and units of each "
-        "channel, dead, doubled and exchanged channels, reciprocity, passivity, bad lines, missing FRFs. With --j, --k "
-        "and --dofs the channels of the joint, with --at also each beside the rigid motion of the others, and the "
-        "reference point beside the channels, else all channels. Exit status 0: neither errors nor warnings; 1: some."
+        "Check measured FRFs: content of the file; quantity, time convention, sign, gain, delay and units of each "
+        "channel; dead, doubled and exchanged channels; reciprocity, passivity, bad lines, missing FRFs. --j, --k and "
+        "--dofs select the channels of the joint; --at adds a comparison of each channel with the rigid motion of its "
+        "side. Exit status 0: no errors or warnings; 1: some."
     )
+    parser.examples += [
+        "jointfrf check cases/hammer-test/two_bars.uff",
+        "jointfrf check cases/bending-sides/test.uff --at 0,0,0 --j 101:104 --k 201:204 --dofs y,rz",
+    ]
     add_file_arguments(parser)
 
 
@@ -42,8 +46,9 @@ def check_joint(joint: MeasuredJoint, read_as: str) -> FrfCheck:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
-    measured = read_measured(args)
-    frfs = measured.receptance()
+    with waiting(f"reading {file_names(args)}"):
+        measured = read_measured(args)
+        frfs = measured.receptance()
     out.say(frfs.summary(), "")
     joint = None
     if any(getattr(args, name) is not None for name in _OF_JOINT):

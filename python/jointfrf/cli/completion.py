@@ -18,11 +18,12 @@ _SHELLS = ("bash", "zsh", "fish")
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Print a script that completes commands, options, their values and files. bash: jointfrf completion bash > "
-        "~/.local/share/bash-completion/completions/jointfrf; zsh: jointfrf completion zsh > _jointfrf in a folder of "
-        "$fpath; fish: jointfrf completion fish > ~/.config/fish/completions/jointfrf.fish."
+        "Print a script that completes commands, options, their values and files. bash: write it to "
+        "~/.local/share/bash-completion/completions/jointfrf; zsh: to _jointfrf in a folder of $fpath; fish: to "
+        "~/.config/fish/completions/jointfrf.fish."
     )
-    parser.add_argument("shell", choices=_SHELLS, type=one_of(_SHELLS), help="the shell")
+    parser.examples.append("jointfrf completion bash > jointfrf.bash")
+    parser.add_argument("shell", metavar="SHELL", choices=_SHELLS, type=one_of(_SHELLS), help="shell of the script")
 
 
 def run(args: argparse.Namespace) -> int:

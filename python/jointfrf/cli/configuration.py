@@ -61,15 +61,15 @@ def with_configuration(args: argparse.Namespace, parser: CommandParser, command:
     for source, key in everywhere + ([(own, key) for key in own.content] if own else []):
         if is_found and _option(key) not in (*shared, *_OF_THE_FIT):
             raise source.wrong(
-                key, f"say it on the command line, or name the file by --config: a {CONFIGURATION} that is found "
-                "gives channels and defaults of the fit"
+                key, f"not taken from a {CONFIGURATION} in the working directory; give it on the command line, or "
+                "name the file by --config"
             )  # fmt: skip
         action = options.get(_option(key))
         if action is None:
             continue
         value = _value(source, key, action, path.parent, is_list=action.dest in parser.repeated)
         if is_found and isinstance(value, Path) and not value.resolve().is_relative_to(path.parent.resolve()):
-            raise source.wrong(key, f"{value} is not in the folder of this file, which was found and not named")
+            raise source.wrong(key, f"{value} is not in the folder of this file; name the file by --config")
         if action.dest not in typed:
             setattr(args, action.dest, value)
             args.given.add(action.dest)
@@ -83,7 +83,7 @@ def _path(args: argparse.Namespace) -> Path | None:
     if args.config is not None:
         path = Path(args.config)
         if not path.is_file():
-            raise UsageError(f"--config: there is no file {path}")
+            raise UsageError(f"--config: file {path} does not exist; give the name of a file")
         return path
     path = Path(CONFIGURATION)
     return path if not args.no_config and path.is_file() else None
@@ -129,7 +129,7 @@ def _value(source: TomlTable, key: str, action: argparse.Action, folder: Path, *
     try:
         if action.nargs == 0:
             if not isinstance(value, bool):
-                raise ValueError(f"must be true or false, not {value!r}")
+                raise ValueError(f"{value!r} is no switch; write true or false")
             return value
         if not is_list:
             return _one(action, _text(value, ","), folder)
@@ -144,7 +144,7 @@ def _text(value: Any, between: str) -> str:
     if isinstance(value, list):
         return between.join(_text(one, ":") for one in value)
     if isinstance(value, bool) or not isinstance(value, str | int | float):
-        raise ValueError(f"must be a text, a number or a list of these, not {value!r}")
+        raise ValueError(f"{value!r} is no option value; write a text, a number or a list")
     return str(value)
 
 

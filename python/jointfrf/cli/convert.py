@@ -19,24 +19,25 @@ def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         f"Read measured FRFs, {format_names()}, whose format is detected from their content, and write them, in SI "
-        f"units, as {format_names(written=True)}. Several files of one test become one. Options stand before or after "
+        f"units, as {format_names(written=True)}. Several files of one test are merged. Put options before or after "
         "all files."
     )
-    parser.add_argument("files", nargs="+", type=Path, metavar="IN", help="files to read, and last the one to write")
+    parser.examples.append("jointfrf convert cases/hammer-test/two_bars.uff bars.npz --band 20:500")
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="files to read, then the file to write")
     add_reading_arguments(parser)
-    parser.option("--nodes NODES", "only FRFs between these nodes: 102,104", nodes)
-    parser.option("--band LOW:HIGH", "only the lines in this band in Hz", parse_band)
-    parser.option("--averages N", "number of averages, where the files do not say it", float)
+    parser.option("--nodes NODES", "keep only FRFs between these nodes: 102,104", nodes)
+    parser.option("--band LOW:HIGH", "keep only the lines in this band in Hz", parse_band)
+    parser.option("--averages N", "number of averages, if the files do not state it", float)
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     *sources, target = args.files
     if not sources:
-        raise UsageError("name the files to read, and last the one to write: jointfrf convert IN ... OUT")
+        raise UsageError("the file to write is missing: jointfrf convert IN ... OUT")
     check_target(target)
     if any(target.exists() and source.exists() and target.samefile(source) for source in sources):
-        raise UsageError(f"{target} is one of the files to read")
+        raise UsageError(f"{target} is also a file to read; name another file to write")
     frfs = read_frfs(
         *sources,
         **reading_options(args),

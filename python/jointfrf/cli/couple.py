@@ -38,8 +38,13 @@ def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         "Couple two substructures by a joint (2.26) and write the FRFs of the assembly. A substructure is a file of "
-        "FRFs or a TOML file of a model; the joint is a JSON file of identify --save, or a TOML file with dofs, "
+        "FRFs or a TOML file of a model. The joint is a JSON file of identify --save, or a TOML file with dofs, "
         "stiffness, damping, loss_factor, or with laws of its DOFs."
+    )
+    parser.requires("--joint", "--j", "--k", "--output")
+    parser.examples.append(
+        "jointfrf couple cases/two-beams/a.toml cases/two-beams/b.toml --joint cases/two-beams/joint.toml --j 11 --k 1 "
+        "--renumber-b 100 --band 20:800 --step 1 --output assembly.uff"
     )
     parser.add_argument("a", type=Path, metavar="A", help="substructure A: file of FRFs, or model (.toml)")
     parser.add_argument("b", type=Path, metavar="B", help="substructure B")
@@ -52,11 +57,11 @@ def add_arguments(parser: CommandParser) -> None:
 def add_joint_arguments(parser: CommandParser) -> None:
     """Describe the joint, and where it is in its parts."""
     parser.option("--joint FILE", "the joint: .json or .toml", Path)
-    parser.option("--j NODES", "node of A at the joint, which has its DOFs; or, with --at, nodes around it", nodes)
-    parser.option("--k NODES", "node or nodes of B", nodes)
+    parser.option("--j NODES", "node of A at the joint, with all joint DOFs; with --at, nodes around the joint", nodes)
+    parser.option("--k NODES", "node of B at the joint; with --at, nodes around it", nodes)
     parser.option("--at X,Y,Z", "reference point of virtual points, m", point)
-    parser.option("--renumber-b N", "add N to the nodes of B, where both have the same", int, 0)
-    parser.option("--shift-b X,Y,Z", "add this to the coordinates of B, m", point, (0.0, 0.0, 0.0))
+    parser.option("--renumber-b N", "number added to the nodes of B, if A and B have equal numbers", int, 0)
+    parser.option("--shift-b X,Y,Z", "vector added to the coordinates of B, m", point, (0.0, 0.0, 0.0))
 
 
 def renumbered(frfs: FrfSet, add: int, shift: Sequence[float] = (0.0, 0.0, 0.0)) -> FrfSet:
@@ -82,9 +87,6 @@ def joint_channels_of(node: int, dofs: Sequence[str]) -> list[Channel]:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
-    for name, value in (("--joint", args.joint), ("--j", args.j), ("--k", args.k), ("--output", args.output)):
-        if value is None:
-            raise UsageError(f"{name} is missing: jointfrf couple A B --joint FILE --j NODE --k NODE --output FILE")
     check_target(args.output)
     found = read_joint_file(args.joint)
     a, b = read_structures([args.a, args.b], lines_of(args), **reading_options(args))
@@ -133,7 +135,7 @@ def coupled(
     shared = {c.node for c in channels[0]} & {c.node for c in channels[1]}
     if shared:
         raise FileContentError(
-            f"node {min(shared)} is in {a.source} and in {b.source}: --renumber-b N adds a number to those of B"
+            f"node {min(shared)} is in {a.source} and in {b.source}; add a number to the nodes of B by --renumber-b N"
         )
     h = couple(matrices[0], matrices[1], joint, ends[0], ends[1], freq_hz=a.freq_hz)
     # Virtual points follow the channels of their side, and are not measured.
@@ -159,18 +161,22 @@ def _with_joint(
         own = [i for i, channel in enumerate(names) if channel.node in found and not channel.is_rotation]
         missing = [node for node in found if node not in frfs.coordinates]
         if missing:
-            raise FileContentError(f"{frfs.source} has no coordinates of node {missing[0]}, which --at needs")
+            raise FileContentError(
+                f"{frfs.source} has no coordinates of node {missing[0]}; add them, or leave out --at"
+            )
         geometry = channel_geometry([names[i] for i in own], frfs.coordinates)
         vp = virtual_point(*geometry, at, joint.dofs)
         whole = append_virtual_point(h, own, vp)
         return whole, list(range(len(names), whole.shape[1]))
     if len(found) != 1:
-        raise UsageError(f"several nodes at the joint ({found[0]}, {found[1]}, ...) need --at X,Y,Z, a virtual point")
+        raise UsageError(
+            f"several nodes at the joint ({found[0]}, {found[1]}, ...); give the virtual point by --at X,Y,Z"
+        )
     places = []
     for wanted in joint_channels_of(found[0], joint.dofs):
         if wanted not in names:
             raise FileContentError(
-                f"{frfs.source} has no FRFs at {wanted}, a DOF of the joint; nodes around it and --at X,Y,Z give one"
+                f"{frfs.source} has no FRFs at joint DOF {wanted}; give nodes around the joint and --at X,Y,Z"
             )
         places.append(names.index(wanted))
     return h, places

@@ -22,7 +22,7 @@ from jointfrf.cli.measured_file import (
     words,
 )
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_folder, waiting, warn_of_ignored
+from jointfrf.cli.usage import Output, UsageError, check_folder, listed, waiting, warn_of_ignored
 from jointfrf.errors import FileContentError, IdentificationWarning
 from jointfrf.files import write_file
 from jointfrf.identification.band_means import identify_band_mean
@@ -53,30 +53,34 @@ def _channels(text: str) -> list[Channel]:
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Identify a joint by FRF decoupling, (2.53) to (2.56): from FRFs of the assembly at internal points r of A and "
-        "s of B, and from both substructures (files of FRFs, or TOML files of models). Exact without noise, and very "
-        "sensitive to it: jointfrf identify, with FRFs at the joint, is not."
+        "Identify a joint by FRF decoupling, (2.53) to (2.56), from FRFs of the assembly at internal points r of A and "
+        "s of B and from both substructures (files of FRFs, or TOML files of models). The result is exact without "
+        "noise and very sensitive to noise; jointfrf identify, with FRFs at the joint, is far less sensitive."
+    )
+    parser.requires("--j", "--k", "--dofs", "--s")
+    parser.requires("--j", "--k", "--dofs", "--r", "--equation")
+    parser.examples.append(
+        "jointfrf decouple cases/two-beams/a.toml cases/two-beams/b.toml assembly.uff --j 11 --k 1 --dofs y,rz "
+        "--s 11:y,11:rz --renumber-b 100 --band 100:300"
     )
     parser.add_argument("a", type=Path, metavar="A", help="substructure A: file of FRFs, or model (.toml)")
     parser.add_argument("b", type=Path, metavar="B", help="substructure B")
     parser.add_argument("assembly", type=Path, metavar="ASSEMBLY", help="file of FRFs of the assembly")
     parser.option(
         "--equation",
-        "responding and excited point: (2.53) rr, (2.54) rs, (2.55) sr, (2.56) ss (default)",
+        "responding and excited point: (2.53) rr, (2.54) rs, (2.55) sr, (2.56) ss",
         tuple(_METHODS),
         "ss",
     )
     parser.option("--j NODE", "node of A at the joint", nodes)
     parser.option("--k NODE", "node of B at the joint", nodes)
-    parser.option("--dofs DOFS", "joint DOFs, which both nodes have: y,rz", joint_dofs)
-    parser.option("--r CHANNELS", "as many channels of A: 7:y,7:rz", _channels)
-    parser.option("--s CHANNELS", "as many channels of B", _channels)
-    parser.option(
-        "--renumber-b N", "add N to the nodes of B, --k and --s, as jointfrf couple did for the assembly", int, 0
-    )
+    parser.option("--dofs DOFS", "joint DOFs, at both nodes: y,rz", joint_dofs)
+    parser.option("--r CHANNELS", "internal channels of A, one for each joint DOF: 7:y,7:rz", _channels)
+    parser.option("--s CHANNELS", "internal channels of B, one for each joint DOF", _channels)
+    parser.option("--renumber-b N", "number added to the nodes of B, --k and --s, as by jointfrf couple", int, 0)
     parser.option("--band LOW:HIGH", "sensitive band in Hz; may be repeated", parse_band, repeated=True)
-    parser.option("--save FILE", "keep the joint in a JSON file", Path)
-    parser.option("--output FILE", "K* of each line as a CSV file", Path)
+    parser.option("--save FILE", "JSON file for the joint", Path)
+    parser.option("--output FILE", "CSV file for K* of each line", Path)
     add_reading_arguments(parser)
 
 
@@ -101,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
     s = None if args.s is None else [Channel(c.node + args.renumber_b, c.direction) for c in args.s]
     at = {"r": args.r, "s": s}
     unused = [f"--{point}" for point in ("r", "s") if point not in args.equation]
-    warn_of_ignored(args, unused, f"equation {args.equation} does not use it")
+    warn_of_ignored(args, unused, f"equation {args.equation} does not use {'it' if len(unused) == 1 else 'them'}")
     side_a = _side(a, args.j, args.dofs, args.r)
     side_b = _side(b, k, args.dofs, s)
     measured = assembly.matrix(at[args.equation[0]], at[args.equation[1]])
@@ -132,13 +136,14 @@ def _check(args: argparse.Namespace) -> None:
     wanted |= {f"--{point}": getattr(args, point) for point in dict.fromkeys(args.equation)}
     missing = [name for name, value in wanted.items() if value is None]
     if missing:
-        raise UsageError(f"equation {args.equation} needs {' and '.join(missing)}: see jointfrf decouple --help")
+        verb = "is" if len(missing) == 1 else "are"
+        raise UsageError(f"{listed(missing)} {verb} missing; equation {args.equation} needs {listed(list(wanted))}")
     for name, channels in (("--r", args.r), ("--s", args.s)):
         if channels is not None and len(channels) != len(args.dofs):
-            raise UsageError(f"{name} must name {len(args.dofs)} channels, as many as --dofs, not {len(channels)}")
+            raise UsageError(f"{name} names {len(channels)} channels; give {len(args.dofs)}, one for each of --dofs")
     for name, side in (("--j", args.j), ("--k", args.k)):
         if len(side.numbers) != 1:
-            raise UsageError(f"{name} must name one node, not {shown_nodes(side.numbers)}")
+            raise UsageError(f"{name} names nodes {shown_nodes(side.numbers)}; give one node")
 
 
 def _side(frfs: FrfSet, at: Nodes, dofs: list[str], internal: list[Channel] | None) -> _Side:
@@ -155,7 +160,9 @@ def _side(frfs: FrfSet, at: Nodes, dofs: list[str], internal: list[Channel] | No
 def _found(frfs: FrfSet, names: tuple[Channel, ...], wanted: list[Channel]) -> list[int]:
     for channel in wanted:
         if channel not in names:
-            raise FileContentError(f"{frfs.source} has no FRFs at {channel} (response and excitation)")
+            raise FileContentError(
+                f"{frfs.source} has no FRFs with {channel} as response and as excitation; name another channel"
+            )
     return [names.index(channel) for channel in wanted]
 
 

@@ -56,32 +56,44 @@ def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         "Write a joint as input of a finite-element program: abaqus (springs and dashpots, or matrices), calculix "
-        "(springs), nastran (CBUSH, or DMIG) or ansys (MATRIX27), with comments on what each number is worth."
+        "(springs), nastran (CBUSH, or DMIG) or ansys (MATRIX27), with the interval of each number as a comment."
     )
-    parser.add_argument("joint", type=Path, help="JSON file of identify --save, or a TOML file of constants or laws")
+    parser.examples += [
+        "jointfrf export joint.json nastran:9001,9002 --output joint.bdf",
+        "jointfrf export joint.json calculix:9001,9002,9003,9004 --nodes-at 0.05,0,0,0.07,0,0 --output joint.inp",
+    ]
+    parser.add_argument(
+        "joint", type=Path, metavar="JOINT", help="JSON file of identify --save, or a TOML file of constants or laws"
+    )
     parser.add_argument(
         "export",
         type=parse_export,
         metavar="PROGRAM:J,K",
-        help="program and nodes j and k of its model: nastran:9001,9002; calculix: two ROT NODEs more for rotations; "
-        "of several joints nastran:fl=9001,9002:fr=9003,9004",
+        help="program and nodes j and k of its model: nastran:9001,9002; rotations of calculix need two ROT NODEs "
+        "after them; several joints: nastran:fl=9001,9002:fr=9003,9004",
     )
     parser.option(
         "--frequency HZ",
-        "where laws that depend on frequency are taken; LOW:HIGH writes tables over frequency (abaqus, nastran)",
+        "frequency at which frequency-dependent laws are evaluated; LOW:HIGH writes tables over frequency (abaqus, "
+        "nastran)",
         _frequency,
     )
-    parser.option("--point NAME", "of a fit of several joint points: the one that is written: bolt1")
-    parser.option("--joint-at X,Y,Z", "reference point of the joint in the model, in its unit of length (saved)", point)
+    parser.option("--point NAME", "joint point to write, from a fit of several joint points: bolt1")
+    parser.option(
+        "--joint-at X,Y,Z",
+        "reference point of the joint in the model, in its unit of length",
+        point,
+        otherwise="the saved reference point",
+    )
     add_card_arguments(parser)
 
 
 def _frequency(text: str) -> float | tuple[float, float]:
     low, colon, high = text.partition(":")
-    (found,) = numbers(low, 1, "a frequency in Hz, or LOW:HIGH")
-    last = numbers(high, 1, "LOW:HIGH in Hz")[0] if colon else found
+    (found,) = numbers(low, 1, ("frequency", "HZ or LOW:HIGH"))
+    last = numbers(high, 1, ("frequency", "LOW:HIGH in Hz"))[0] if colon else found
     if not found > 0 or (colon and not found < last):
-        raise argparse.ArgumentTypeError(f"must be a frequency above 0 Hz, or LOW:HIGH, not {text!r}")
+        raise argparse.ArgumentTypeError(f"{text!r} is no band or frequency above 0 Hz; use HZ or LOW:HIGH")
     return (float(found), float(last)) if colon else float(found)
 
 
@@ -110,7 +122,7 @@ def run(args: argparse.Namespace) -> int:
     if isinstance(found.joint, Joint) and at is not None:
         warn_of_ignored(args, ("--frequency",), "no law of this joint depends on frequency")
     if args.nodes_at is None:
-        warn_of_ignored(args, ("--joint-at",), "without --nodes-at the nodes are taken to lie at the joint")
+        warn_of_ignored(args, ("--joint-at",), "without --nodes-at the nodes are at the joint")
     is_table = isinstance(args.frequency, tuple)
     damping, cross = ("none", "zero") if is_table else _terms(_springs(found.joint, at))
     request = card_request(args, found.joint.dofs, damping=damping, cross=cross, points=_points(args, found))
@@ -133,7 +145,7 @@ def _by_hand(found: JointFile, request: CardRequest, freq_hz: float | None) -> s
     """Return the cards of a joint that was written by hand."""
     options: CardOptions = {**request.options, "comments": found.about}
     if isinstance(request.nodes, dict):
-        raise UsageError("nodes by names of joints are for a saved fit of several joints")
+        raise UsageError("the file has one joint without a name; give its nodes as PROGRAM:J,K")
     try:
         if isinstance(found.joint, LawJoint):
             return found.joint.export(request.program, request.nodes, freq_hz=freq_hz, **options)
@@ -151,8 +163,11 @@ def _at_point(found: JointFile, point: str | None) -> JointFile:
         return found
     if found.fit is None or point not in known:
         raise UsageError(
-            f"--point must be one joint point of the file ({', '.join(known) or 'it has none'})"
-            + (f", not {point!r}" if point is not None else "; or name the nodes of all, PROGRAM:NAME=J,K:...")
+            f"--point is {point!r}; use one of {', '.join(known)}"
+            if known and point is not None
+            else "the file has no joint points; leave out --point"
+            if point is not None
+            else f"the file has joint points {', '.join(known)}; name one by --point, or all by PROGRAM:NAME=J,K:..."
         )
     fit = found.fit.at_point(point)
     return found._replace(fit=fit, joint=fit.joint, about=(*found.about, f"joint point {point}"))
@@ -196,7 +211,7 @@ def _terms(joint: Joint | None) -> tuple[str, str]:
 
 def _points(args: argparse.Namespace, found: JointFile) -> FloatArray | None:
     if args.joint_at is not None:
-        return np.tile(args.joint_at, (2, 1)) * model_units(args.units or "SI").length
+        return np.tile(args.joint_at, (2, 1)) * model_units(args.units).length
     return found.points
 
 
@@ -231,14 +246,18 @@ def parse_export(text: str) -> tuple[CardFormat, CardNodes]:
     program, _, rest = text.partition(":")
     known = get_args(CardFormat)
     if program not in known:
-        raise argparse.ArgumentTypeError(f"{program!r} is none of {', '.join(known)}{did_you_mean(program, known)}")
+        raise argparse.ArgumentTypeError(
+            f"unknown program {program!r}; use one of {', '.join(known)}{did_you_mean(program, known)}"
+        )
     if "=" not in rest:
         return cast(CardFormat, program), _ends(text, program, rest)
     of_joints: dict[str, list[int]] = {}
     for part in rest.split(":"):
         name, _, own = part.partition("=")
         if not name or name in of_joints:
-            raise argparse.ArgumentTypeError(f"{text!r} names {name or 'no joint'} {'twice' if name else f'of {own}'}")
+            raise argparse.ArgumentTypeError(
+                f"{text!r} names {name or 'no joint'} {'twice' if name else f'for {own}'}; name each joint once"
+            )
         of_joints[name] = _ends(text, program, own)
     return cast(CardFormat, program), of_joints
 
@@ -247,11 +266,11 @@ def _ends(text: str, program: str, rest: str) -> list[int]:
     """Return the nodes of one joint."""
     ends = list(nodes(rest).numbers) if rest else []
     if 0 < len(ends) < len(words(rest)):
-        raise argparse.ArgumentTypeError(f"{text!r} names a node twice")
+        raise argparse.ArgumentTypeError(f"{text!r} names a node twice; give different nodes")
     if len(ends) not in (2, 4 if program == "calculix" else 2):
         raise argparse.ArgumentTypeError(
-            f"{text!r} must be a program with nodes j and k, such as abaqus:9001,9002 or, of several joints, "
-            "abaqus:fl=9001,9002:fr=9003,9004; calculix needs two ROT NODEs more"
+            f"{text!r} is no program with nodes j and k; use abaqus:9001,9002, for several joints "
+            "abaqus:fl=9001,9002:fr=9003,9004, with two more ROT NODEs for calculix"
         )
     return ends
 
@@ -264,38 +283,41 @@ def page_nodes(args: argparse.Namespace) -> Sequence[int]:
 def _faces(text: str) -> tuple[list[int], list[int]]:
     one, colon, other = text.partition(":")
     if not colon:
-        raise argparse.ArgumentTypeError(f"{text!r} is not two lists of nodes like 11,12,13:21,22,23")
+        raise argparse.ArgumentTypeError(f"{text!r} is not two lists of nodes; use the form 11,12,13:21,22,23")
     return list(nodes(one).numbers), list(nodes(other).numbers)
 
 
 def _positions(text: str) -> tuple[tuple[float, ...], ...]:
-    found = numbers(text, 6, "xj,yj,zj,xk,yk,zk in m")
+    found = numbers(text, 6, ("pair of points", "xj,yj,zj,xk,yk,zk"))
     return found[:3], found[3:]
 
 
 def add_card_arguments(parser: CommandParser) -> None:
     """Describe what belongs to the cards of any program."""
-    parser.option("--output FILE", "write the cards into this file: joint.bdf", Path)
+    parser.option("--output FILE", "file for the cards: joint.bdf", Path)
     parser.option(
         "--nodes-at XJ,YJ,ZJ,XK,YK,ZK",
-        "where the two nodes of the model are, in its unit of length: rigid arms lead from them to the reference point "
-        "of the joint (without it the nodes are taken to lie there)",
+        "positions of the two nodes of the model, in its unit of length; rigid arms connect them to the reference "
+        "point of the joint",
         _positions,
+        otherwise="the reference point",
     )
-    parser.option("--units SYSTEM", "units of the model: SI, mm-t-s or mm-kg-ms (SI)", get_args(UnitSystemName))
+    parser.option("--units", "units of the model", get_args(UnitSystemName), "SI")
     parser.option(
         "--faces J1,J2,...:K1,K2,...",
-        "nodes of solid elements that follow the two nodes as rigid bodies (with --model those of rigid reference "
-        "points of the joint; without any such cards are a comment)",
+        "nodes of solid elements that follow the two nodes as rigid bodies",
         _faces,
+        otherwise="with --model the nodes of rigid reference points, else a comment to fill in",
     )
-    parser.option("--element N", "first number of new elements (1)", positive, 1)
-    parser.option("--property N", "first number of properties (1)", positive, 1)
-    parser.option("--full-matrix", "matrices where springs would do (abaqus, nastran)")
-    parser.option("--connector", "abaqus: a connector element, which direct steady-state steps take, not matrices")
-    parser.option("--all-damping", "also dashpots that are negative or not significantly above zero")
-    parser.option("--bounds", "also stiffnesses of which only a bound is known, by their best estimates")
-    parser.option("--no-damping", "no damping in the cards")
+    parser.option("--element N", "first number of new elements", positive, 1)
+    parser.option("--property N", "first number of new properties", positive, 1)
+    parser.option("--full-matrix", "write matrices even if springs suffice (abaqus, nastran)")
+    parser.option(
+        "--connector", "write a connector element, for direct steady-state steps, instead of matrices (abaqus)"
+    )
+    parser.option("--all-damping", "include dashpots that are negative or not significantly above zero")
+    parser.option("--bounds", "include stiffnesses with an unbounded interval, by their best estimates")
+    parser.option("--no-damping", "leave out all damping")
 
 
 def card_request(
@@ -319,16 +341,11 @@ def card_request(
         The program cannot hold it, or a number is out of range.
     """
     if args.export is None:
-        for name, given in (
-            ("--output", args.output),
-            ("--nodes-at", args.nodes_at),
-            ("--units", args.units),
-            ("--faces", args.faces),
-        ):
-            if given is not None:
+        for name in ("--output", "--nodes-at", "--units", "--faces"):
+            if name.removeprefix("--").replace("-", "_") in args.given:
                 raise UsageError(f"{name} is for cards; add --export PROGRAM:J,K")
         flags = ("--element", "--property", "--full-matrix", "--connector", "--all-damping", "--bounds", "--no-damping")
-        warn_of_ignored(args, flags, "it is for cards, --export PROGRAM:J,K")
+        warn_of_ignored(args, flags, "no cards are written without --export PROGRAM:J,K")
         return None
     check_folder("--output", args.output)
     program, ends = args.export
@@ -341,13 +358,13 @@ def card_request(
         "damping": not args.no_damping and program != "calculix",  # it has none between DOFs; the text says so
         "full_matrix": args.full_matrix,
         "connector": args.connector,
-        "units": args.units or "SI",
+        "units": args.units,
         "faces": args.faces,
     }
     if args.nodes_at is not None:
         options["positions"] = np.array(args.nodes_at)
         if points is not None:
-            options["points"] = points / model_units(args.units or "SI").length
+            options["points"] = points / model_units(args.units).length
     request = CardRequest(program, of_joints or ends[:2], options, args.all_damping, args.bounds, args.output)
     try:
         for name, own in (of_joints or {"": ends}).items():
@@ -365,12 +382,12 @@ def _check_joints(args: argparse.Namespace, dofs: Sequence[str], of_joints: Mapp
     if sorted(of_joints) != sorted(known) and (of_joints or len(known) > 1):
         example = ":".join(f"{name}={9001 + 2 * i},{9002 + 2 * i}" for i, name in enumerate(known) if name)
         raise UsageError(
-            f"--export must name the nodes of each joint, {', '.join(filter(None, known)) or 'one without a name'}"
-            + (f": {args.export[0]}:{example}" if example else f", such as {args.export[0]}:9001,9002")
+            f"--export does not name the nodes of each joint ({', '.join(filter(None, known)) or 'unnamed'}); use "
+            + (f"{args.export[0]}:{example}" if example else f"{args.export[0]}:9001,9002")
         )
     for name, given in (("--nodes-at", args.nodes_at), ("--faces", args.faces)):
         if of_joints and given is not None:
-            raise UsageError(f"{name} is of one joint; use --save, then jointfrf export FILE PROGRAM:J,K --point NAME")
+            raise UsageError(f"{name} takes one joint; use --save, then jointfrf export FILE PROGRAM:J,K --point NAME")
 
 
 def _probe(n: int, dofs: Sequence[str], damping: str, cross: str) -> Joint:

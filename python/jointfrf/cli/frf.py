@@ -18,7 +18,7 @@ from jointfrf.cases.keys import MOST_LINES
 from jointfrf.cases.substructures import ModelStructure
 from jointfrf.cli.measured_file import READING, add_reading_arguments, parse_band, reading_options, words
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import OptionWarning, Output, UsageError, waiting, warn_of_ignored
+from jointfrf.cli.usage import OptionWarning, Output, UsageError, listed, waiting, warn_of_ignored
 from jointfrf.dofs import DIRECTIONS, direction_places
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.extras import check_extras
@@ -43,6 +43,8 @@ __all__ = [
 
 #: Options that name files of matrices.
 _MATRICES = ("stiffness", "mass", "damping", "structural_damping")
+#: FRFs between more DOFs are hardly meant.
+_MOST_DOFS = 240
 
 
 def add_arguments(parser: CommandParser) -> None:
@@ -52,15 +54,22 @@ def add_arguments(parser: CommandParser) -> None:
         "the keys of a substructure of a case (chain, beam, brick-beam, matrices, modes) or of a part of an assembly, "
         "or matrices named by options."
     )
-    parser.add_argument("model", nargs="?", type=Path, help="TOML file of a model; or --stiffness and --mass")
+    parser.requires("MODEL", "--output", "--band", "--step")
+    parser.requires("MODEL", "--output", "--lines-of")
+    parser.requires("--stiffness", "--mass", "--dof-names", "--output", "--band", "--step")
+    parser.examples.append("jointfrf frf cases/two-beams/a.toml --band 20:800 --step 1 --output a.uff")
+    parser.add_argument(
+        "model", nargs="?", type=Path, metavar="MODEL", help="TOML file of a model; or --stiffness, --mass, --dof-names"
+    )
     parser.option("--output FILE", f"file to write: {format_names(written=True)}", Path)
     add_line_arguments(parser)
-    parser.option("--lines-of FILE", "instead: the lines of this file of FRFs", Path)
-    parser.option("--points DOFS", "DOFs of the model: 3:y,3:theta (default: all, where they are few)", words)
-    parser.heading("matrices of your own (Matrix Market, or NPZ)")
-    for name, what in zip(_MATRICES, ("K, N/m", "M, kg", "viscous C, N s/m", "structural H, N/m"), strict=True):
-        parser.option(f"--{name.replace('_', '-')} FILE", what)
-    parser.option("--loss-factor ETA", "loss factor of the stiffness (0)", float)
+    parser.option("--lines-of FILE", "file of FRFs whose frequency lines are used, instead of --band and --step", Path)
+    parser.option("--points DOFS", "DOFs of the model: 3:y,3:theta", words, otherwise=f"all, up to {_MOST_DOFS}")
+    parser.heading("a model by its matrices (Matrix Market or NPZ)")
+    names = ("stiffness K, N/m", "mass M, kg", "viscous damping C, N s/m", "structural damping H, N/m")
+    for name, what in zip(_MATRICES, names, strict=True):
+        parser.option(f"--{name.replace('_', '-')} FILE", f"file of the {what}")
+    parser.option("--loss-factor ETA", "loss factor of the stiffness", float, 0.0)
     parser.option("--dof-names FILE", "text file, one DOF a line: 12:y, or 12 2")
     parser.heading("the file of --lines-of")
     add_reading_arguments(parser)
@@ -70,19 +79,19 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
     if args.output is None:
-        raise UsageError("--output is missing: the file to write, such as --output model.uff")
+        raise UsageError("--output is missing; name the file to write, such as --output model.uff")
     check_target(args.output)
     structure = read_structure(_table(args))
     freq_hz = lines_of(args)
     if args.lines_of is not None:
         if freq_hz is not None:
-            raise UsageError("--lines-of and --step both name lines: leave one out")
+            raise UsageError("--lines-of and --step both give lines; leave out one")
         held = read_frfs(args.lines_of, **reading_options(args))
         freq_hz = (held if args.band is None else held.select(args.band)).freq_hz
     else:
-        warn_of_ignored(args, READING, "no file of FRFs is read, which --lines-of names")
+        warn_of_ignored(args, READING, "no file of FRFs is read without --lines-of")
     if freq_hz is None:
-        raise UsageError("frequency lines are missing: --band LOW:HIGH --step HZ, or --lines-of FILE")
+        raise UsageError("frequency lines are missing; add --band LOW:HIGH --step HZ, or --lines-of FILE")
     source = str(args.model or args.stiffness)
     with waiting("receptances"):
         frfs, named = frfs_of_model(structure, freq_hz, args.points, source)
@@ -109,25 +118,23 @@ def run(args: argparse.Namespace) -> int:
 def _table(args: argparse.Namespace) -> TomlTable:
     """Return the table of the model: that of the file, or one of the options."""
     given: dict[str, Any] = {name: getattr(args, name) for name in _MATRICES if getattr(args, name) is not None}
-    if args.loss_factor is not None:
+    if "loss_factor" in args.given:
         given["loss_factor"] = args.loss_factor
     if args.dof_names is not None:
         given["dofs"] = args.dof_names
     if args.model is not None:
         if given:
-            raise UsageError("a model and matrices by options are both named: leave one out")
+            raise UsageError("MODEL and options for matrices are both given; leave out one")
         if not is_model(args.model):
-            raise UsageError(f"{args.model} is no TOML file of a model; FRFs are converted by jointfrf convert")
+            raise UsageError(f"{args.model} is no TOML file of a model; convert FRFs by jointfrf convert")
         return read_toml(args.model)
     missing = [name for name, key in (("--stiffness", "stiffness"), ("--mass", "mass"), ("--dof-names", "dofs"))
                if key not in given]  # fmt: skip
     if missing:
-        raise UsageError(f"{', '.join(missing)}: missing; or name the TOML file of a model")
+        raise UsageError(f"no model is given; name its TOML file, or add {listed(missing)}")
     return TomlTable({"model": "matrices", **given}, "options")
 
 
-#: FRFs between more DOFs are hardly meant.
-_MOST_DOFS = 240
 #: Directions of channels, and how names of other DOFs that are rotations begin.
 CHANNEL_DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _TURNS = re.compile(r"m?theta|phi|rot")
@@ -148,17 +155,17 @@ def check_target(target: Path) -> None:
     except ValueError as error:
         raise UsageError(error) from error
     if not target.parent.is_dir():
-        raise UsageError(f"there is no folder {target.parent}")
+        raise UsageError(f"folder {target.parent} does not exist; create it, or name another file")
     if target.is_dir():
-        raise UsageError(f"{target} is a folder, not a file")
+        raise UsageError(f"{target} is a folder; name a file")
     if needed:
         check_extras(needed)
 
 
 def add_line_arguments(parser: CommandParser) -> None:
     """Describe the frequency lines of models."""
-    parser.option("--band LOW:HIGH", "first and last frequency in Hz", parse_band)
-    parser.option("--step HZ", "spacing of the lines, for models, with --band", float)
+    parser.option("--band LOW:HIGH", "first and last frequency, Hz", parse_band)
+    parser.option("--step HZ", "spacing of the frequency lines of models, Hz; needs --band", float)
 
 
 def lines_of(args: argparse.Namespace) -> FloatArray | None:
@@ -166,13 +173,15 @@ def lines_of(args: argparse.Namespace) -> FloatArray | None:
     if args.step is None:
         return None
     if args.band is None:
-        raise UsageError("--step needs --band LOW:HIGH")
+        raise UsageError("--step without a band; add --band LOW:HIGH")
     low, high = args.band
     if not (0 < args.step < np.inf and 0 < low <= high < np.inf):
-        raise UsageError(f"--band and --step must be positive and increase, not {low:g}:{high:g} and {args.step:g}")
+        raise UsageError(
+            f"--band {low:g}:{high:g} --step {args.step:g} gives no lines; use positive numbers with LOW below HIGH"
+        )
     count = int(np.floor((high - low) / args.step * (1 + 1e-12))) + 1
     if count > MOST_LINES:
-        raise UsageError(f"--band and --step give {count} lines, more than {MOST_LINES}")
+        raise UsageError(f"--band and --step give {count} lines; use at most {MOST_LINES}")
     lines: FloatArray = low + args.step * np.arange(count)
     return lines
 
@@ -212,7 +221,7 @@ def frfs_of_model(
     known = structure.modes.dofs if isinstance(structure, ModalStructure) else structure.model.dofs
     dofs = list(known) if points is None else list(points)
     if points is None and len(dofs) > _MOST_DOFS:
-        raise UsageError(f"{source} has {len(dofs)} DOFs: name those wanted by --points, such as {dofs[0]},{dofs[-1]}")
+        raise UsageError(f"{source} has {len(dofs)} DOFs; select some by --points, such as {dofs[0]},{dofs[-1]}")
     channels, named = _channels(dofs)
     h = structure.receptance(freq_hz, dofs)
     places: Mapping[int, FloatArray] = {}
@@ -235,13 +244,13 @@ def _channels(dofs: Sequence[str]) -> tuple[tuple[Channel, ...], dict[str, int]]
             place = 5 if _TURNS.fullmatch(direction.lower()) else int(direction_places([direction])[0])
         except ValueError:
             raise ValueError(
-                f"DOF {dof!r} is not like node:direction with a direction {', '.join(DIRECTIONS)}"
+                f"DOF {dof!r} is not of the form node:direction; use a direction of {', '.join(DIRECTIONS)}"
             ) from None
         if not node.isdecimal() and node not in named:
             named[node] = max([*numbers, *named.values(), 0]) + 1
         channels.append(Channel(int(node) if node.isdecimal() else named[node], CHANNEL_DIRECTIONS[place]))
     if len(set(channels)) < len(channels):
-        raise ValueError("a DOF is named twice")
+        raise ValueError("a DOF is named twice; name each DOF once")
     return tuple(channels), named
 
 
@@ -269,13 +278,15 @@ def read_structures(paths: Sequence[Path], freq_hz: FloatArray | None, **options
         first = next(iter(measured.values()))
         for each in measured.values():
             if not same_lines(first.freq_hz, each.freq_hz):
-                raise FileContentError(f"{first.source} and {each.source} have different frequency lines")
+                raise FileContentError(
+                    f"{first.source} and {each.source} have different frequency lines; use files with equal lines"
+                )
         if freq_hz is not None:
             why = f"{first.source} has frequency lines of its own"
             warnings.warn(f"--step has no effect: {why}", OptionWarning, stacklevel=2)
         freq_hz = first.freq_hz
     if freq_hz is None:
-        raise UsageError("models need frequency lines: --band LOW:HIGH --step HZ")
+        raise UsageError("models need frequency lines; add --band LOW:HIGH --step HZ")
     found = []
     for path in paths:
         if path in measured:
@@ -300,5 +311,7 @@ def own_matrix(frfs: FrfSet) -> tuple[tuple[Channel, ...], np.ndarray]:
     driven = {(c.node, c.axis) for c in frfs.excitations}
     both = tuple(dict.fromkeys(Channel(c.node, c.axis) for c in frfs.responses if (c.node, c.axis) in driven))
     if not both:
-        raise FileContentError(f"{frfs.source} has no channel that is both a response and an excitation")
+        raise FileContentError(
+            f"{frfs.source} has no channel that is both response and excitation; use a file with driving-point FRFs"
+        )
     return both, frfs.matrix(both, both)

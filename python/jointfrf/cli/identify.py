@@ -30,7 +30,7 @@ from jointfrf.cli.measured_file import (
 )
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_folder, check_out, plain, waiting, warn_of_ignored
+from jointfrf.cli.usage import Interrupt, Output, UsageError, check_folder, check_out, plain, waiting, warn_of_ignored
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
 from jointfrf.extras import check_extras
@@ -57,80 +57,91 @@ def _methods(text: str) -> list[str]:
     for word in found or [text]:
         if word not in _METHODS:
             hint = did_you_mean(word, _METHODS)
-            raise argparse.ArgumentTypeError(f"{word!r} is not one of {', '.join(_METHODS)}{hint}")
+            raise argparse.ArgumentTypeError(f"unknown method {word!r}; use one of {', '.join(_METHODS)}{hint}")
     return found
 
 
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Identify a joint from the FRFs of an assembly. Accelerances and mobilities become receptances. The DOFs of "
-        "the joint are those of virtual points of all channels around it (--at), of points along a line (rotations by "
-        "central differences), or of two nodes whose rotations are in the file. With models of both parts (--model) "
-        "any FRFs will do."
+        "Identify a joint from the FRFs of an assembly. Accelerances and mobilities are converted to receptances. The "
+        "joint DOFs are found in one of three ways: virtual points of all channels around the joint (--at), points "
+        "along a line (rotations by central differences), or two nodes whose rotations are in the file. With models of "
+        "both parts (--model), any FRFs of the assembly suffice."
     )
+    parser.requires("--j", "--k", "--dofs")
+    parser.requires("--at", "--channels", "--dofs")
+    parser.requires("--model")
+    parser.examples += [
+        "jointfrf identify cases/hammer-test/two_bars.uff --j 101,102 --k 201,202 --dofs y,rz --save joint.json",
+        "jointfrf identify cases/bending-sides/test.uff --at 0,0,0 --j 101:104 --k 201:204 --dofs y,rz "
+        "--side-j cases/bending-sides/side_j.toml --side-k cases/bending-sides/side_k.toml",
+        "jointfrf identify cases/lap-beam/level_1.uff --model cases/lap-beam/assembly.toml",
+    ]
     add_file_arguments(parser)
     add_model_arguments(parser)
     parser.heading("the fit")
-    parser.option(
-        "--method METHODS", f"one or several of {','.join(_METHODS)} (default: compliance)", _methods, ["compliance"]
-    )
+    parser.option("--method METHODS", f"one or several methods of {','.join(_METHODS)}", _methods, ["compliance"])
     parser.option(
         "--damping",
-        "damping terms of K* = k (1 + i eta) + i w c (default: auto, what the data support)",
+        "damping terms of K* = k (1 + i eta) + i w c; auto: the terms that the data support",
         (*get_args(DampingTerms), "auto"),
         "auto",
     )
     parser.option(
         "--cross",
-        "terms between the joint DOFs: none (default), not looked at, fitted within each of --points, fitted",
+        "terms between the joint DOFs; zero: none, ignore: not evaluated, points: fitted within each of --points, fit: "
+        "fitted",
         get_args(CrossTerms),
         "zero",
     )
-    parser.option(
-        "--same NAMES", "joint points that are equal and share their parameters: bolt1,bolt2", words, repeated=True
-    )
+    parser.option("--same NAMES", "equal joint points, which share their parameters: bolt1,bolt2", words, repeated=True)
     parser.option(
         "--side-j PART",
-        "with --side-k: part.toml, the model of side j alone, free of the other side, as [A] of assembly.toml: "
-        "corrects the FRFs for what the side bends between channels and joint",
+        "part.toml, model of side j alone, free of the other side (keys of [A] of assembly.toml): corrects the FRFs "
+        "for the flexibility of the side between channels and joint; needs --side-k",
         Path,
     )
-    parser.option("--side-k PART", "the same of side k", Path)
+    parser.option("--side-k PART", "part.toml, model of side k alone; needs --side-j", Path)
     add_law_arguments(parser)
-    parser.option("--noise LEVEL", "relative noise of the FRFs, 0.01 for 1 %% (default: from their reciprocity)", float)
+    parser.option(
+        "--noise LEVEL",
+        "relative noise of the FRFs; 0.01 means 1 %%",
+        float,
+        otherwise="estimated from the FRFs",
+    )
     parser.option(
         "--setup-gain LEVEL",
-        "relative standard deviation of the gain of one set-up, 0.01 for 1 %%: each file is one (default: from what "
-        "they differ by)",
+        "relative standard deviation of the gain of one set-up (each file is one); 0.01 means 1 %%",
+        float,
+        otherwise="estimated from the differences between the set-ups",
+    )
+    parser.option(
+        "--common-gain LEVEL",
+        "relative standard deviation of a gain that all FRFs share, such as the calibration of the hammer",
         float,
     )
     parser.option(
-        "--common-gain LEVEL", "that of a gain which all FRFs share, as by one calibration of the hammer", float
-    )
-    parser.option(
         "--accept-bent",
-        "fit FRFs that are bent by amplitude all the same, with a warning: they describe one test, not the structure",
+        "fit amplitude-dependent FRFs, with a warning: the result describes this test, not the structure",
     )
-    parser.option(
-        "--window-decay SIGMA", "exponential window exp(-SIGMA t) of the test, 1/s: taken off stiffnesses", float
-    )
+    parser.option("--window-decay SIGMA", "decay rate of the exponential window exp(-SIGMA t) of the test, 1/s", float)
     parser.option(
         "--bending-stiffness EI",
-        "E I of the thinner part in N m^2: says how much compliance the differences along a line add",
+        "E I of the thinner part in N m^2: prints the compliance that differences along a line add",
         float,
     )
     parser.heading("results")
     parser.option("--out DIR", "folder for identification.json and figures", Path)
-    parser.option("--report FILE", "the identification by method compliance as one HTML page", Path)
-    parser.option("--space", "with --report: a view in space with moving deformation; needs plotly, 5 MB more")
-    parser.option("--save FILE", "keep the joint (by the first method) in a JSON file", Path)
-    parser.option("--save-lines", "with --save: K* of each line, too, which makes the file many times as long")
+    parser.option("--report FILE", "HTML page of the identification by method compliance", Path)
+    parser.option("--space", "add a 3D view with moving deformation to --report; needs plotly, adds 5 MB")
+    parser.option("--save FILE", "JSON file for the joint found by the first method", Path)
+    parser.option("--save-lines", "add K* of each line to --save; the file becomes many times as long")
     parser.option(
         "--export PROGRAM:J,K",
-        "the joint (by the first method) as input of abaqus, calculix (stiffness only), nastran or ansys, between "
-        "its nodes J and K: abaqus:9001,9002; rotations of calculix need two ROT NODEs after them; of several joints "
-        "abaqus:fl=9001,9002:fr=9003,9004",
+        "write the joint found by the first method as input of abaqus, calculix (stiffness only), nastran or ansys, "
+        "between its nodes J and K: abaqus:9001,9002; rotations of calculix need two ROT NODEs after them; several "
+        "joints: abaqus:fl=9001,9002:fr=9003,9004",
         parse_export,
     )
     add_card_arguments(parser)
@@ -140,35 +151,40 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     _check_results(args)
     if args.model is not None:
-        _refuse(args, ("points", "same"), "is of FRFs at the joint points themselves: it does not go with --model")
+        _refuse(args, ("points", "same"), "is for FRFs at the joint; leave it out with --model")
         return run_model(args)
-    _refuse(args, ("each", "find_wrong_channels"), "is for tests with --model: name the file of the assembly")
+    _refuse(args, ("each", "find_wrong_channels"), "needs --model; name the assembly.toml")
     out = Output(args)
     _check_points(args)
-    measured = read_measured(args)
-    frfs = measured.receptance()
+    with waiting(f"reading {file_names(args)}"):
+        measured = read_measured(args)
+        frfs = measured.receptance()
     joint = measured_joint(args, frfs, args.bending_stiffness)
     laws = joint_of_laws(args, joint.dofs)
     sides = _sides(args, frfs, joint)
     points = np.array(joint.responses.references)
     damping = args.damping if laws is None else "none"
     request = card_request(args, joint.dofs, damping=damping, cross=args.cross, points=points)
-    check = check_joint(joint, measured.quantity)
+    with waiting("data checks"):
+        check = check_joint(joint, measured.quantity)
     if not args.accept_bent:
         refuse_amplitude(check.findings)
     _warn(args, joint, check)
     out.say(*_heading(args, frfs, joint), *(line for side in sides for line in side.text))
-    fits = []
-    for method in args.method:
-        with waiting(f"fit by {method}"):
-            fits.append(_fit(args, method, frfs, joint, laws, tuple(side.model for side in sides)))
-        out.say("", fits[-1])
-        out.warn(*fits[-1].warnings)
-    text, written = _write_results(args, frfs, joint, fits, request)
+    fits, interrupt = list[Fit](), Interrupt()
+    with interrupt.kept_back(fits):
+        for method in args.method:
+            with waiting(f"fit by {method}"):
+                fits.append(_fit(args, method, frfs, joint, laws, tuple(side.model for side in sides)))
+            out.say("", fits[-1])
+            out.warn(*fits[-1].warnings)
+    with waiting("results"):
+        text, written = _write_results(args, frfs, joint, fits, request)
     if text and args.output is None:
         out.say("", text.rstrip("\n"))
     out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
     out.give(_content(args, joint, check, fits, text, written))
+    interrupt.resume()
     return 0
 
 
@@ -180,12 +196,12 @@ def _check_results(args: argparse.Namespace) -> None:
     if args.report is not None:
         check_extras("jinja2", *(["plotly"] if args.space else []))
         if "compliance" not in args.method:
-            raise UsageError("--report is of method compliance: name it among the methods")
+            raise UsageError("--report needs method compliance; add it to --method")
         check_out("--report", args.report.parent)
         if args.report.is_dir():
-            raise UsageError(f"--report: {args.report} is a folder, not a file")
+            raise UsageError(f"--report: {args.report} is a folder; name a file")
     elif args.space:
-        raise UsageError("--space is of --report: name a file for the page")
+        raise UsageError("--space needs a page; add --report FILE")
     check_folder("--save", args.save)
 
 
@@ -199,11 +215,11 @@ def _refuse(args: argparse.Namespace, names: tuple[str, ...], why: str) -> None:
 def _check_points(args: argparse.Namespace) -> None:
     """Raise an error for options that do not go with the number of joint points."""
     if args.save is None:
-        warn_of_ignored(args, ("--save-lines",), "it is for --save")
+        warn_of_ignored(args, ("--save-lines",), "nothing is saved without --save")
     if args.points is None:
-        _refuse(args, ("same",), "is of several joint points: name them by --points")
+        _refuse(args, ("same",), "needs several joint points; name them by --points")
     else:
-        _refuse(args, ("side_j", "side_k"), "corrects the FRFs of one joint point: it does not go with --points")
+        _refuse(args, ("side_j", "side_k"), "is for one joint point; leave out --points")
 
 
 def _warn(args: argparse.Namespace, joint: MeasuredJoint, check: FrfCheck) -> None:
@@ -215,7 +231,7 @@ def _warn(args: argparse.Namespace, joint: MeasuredJoint, check: FrfCheck) -> No
         warn_of_ignored(
             args,
             ("--damping", "--cross", "--noise", "--setup-gain", "--common-gain", "--window-decay"),
-            f"method {args.method[0]} does not use it",
+            f"method {args.method[0]} uses no such option",
         )
     if joint.channels is not None or len(joint.nodes[0]) == 1:
         warn_of_ignored(args, ("--bending-stiffness",), "no rotation is found by differences along a line")
@@ -232,8 +248,9 @@ def _write_results(
     if request is not None:
         text = written_cards(fits[0], request, [f"from {file_names(args)}", *_places(joint)])
         written += [] if args.output is None else [args.output]
-    if args.report is not None:
-        fit = fits[args.method.index("compliance")]
+    finished = dict(zip(args.method, fits, strict=False))
+    if args.report is not None and "compliance" in finished:
+        fit = finished["compliance"]
         args.report.parent.mkdir(parents=True, exist_ok=True)
         written.append(write_report(fit, args.report, source=file_names(args), command=args.typed,
                                     nodes=page_nodes(args), space=args.space))  # fmt: skip
@@ -294,9 +311,9 @@ def _sides(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint) -> list
     if not paths:
         return []
     if len(paths) == 1:
-        raise UsageError("--side-j and --side-k go together: both sides of the joint bend")
+        raise UsageError("only one side has a model; give both --side-j and --side-k")
     if "compliance" not in args.method:
-        raise UsageError("--side-j and --side-k are of method compliance: name it among the methods")
+        raise UsageError("--side-j and --side-k need method compliance; add it to --method")
     lines, _ = in_some_band(frfs.freq_hz, joint.h, args.band)
     found = []
     for side, path in enumerate(paths):

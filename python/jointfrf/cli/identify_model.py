@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import csv
 import io
-import time
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -19,16 +18,18 @@ from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.cli.export import CardRequest, card_request, page_nodes, written_cards
 from jointfrf.cli.measured_file import file_names, read_receptances, setups_with_gains
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, complain, time_left, waiting
+from jointfrf.cli.usage import Failures, Interrupt, Output, UsageError, listed, waiting
 from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
 from jointfrf.files import write_file
 from jointfrf.identification.record import fit_to_dict, write_record
 from jointfrf.identification.result import Fit, columns_of
+from jointfrf.io import FrfSet
 from jointfrf.io.units import model_units
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.messages.finding import messages_of
 from jointfrf.report.fit_model import next_sentences
 from jointfrf.report.fit_page import write_report
+from jointfrf.spelling import some_of
 
 __all__ = ["add_model_arguments", "run_model"]
 
@@ -45,50 +46,55 @@ _WIDTH = 100
 
 def add_model_arguments(parser: CommandParser) -> None:
     """Describe the assembly, and several tests."""
-    parser.heading("an assembly whose parts are known")
+    parser.heading("an assembly of parts with models")
     parser.option(
         "--model FILE",
-        "assembly.toml: both parts as models or FRFs, the joint, what else is unknown, which channel is which DOF; "
-        "then any FRFs will do, and none at the joint are needed",
+        "assembly.toml: both parts as models or FRFs, the joint, other unknowns, the DOF of each channel; any FRFs of "
+        "the assembly suffice then",
         Path,
     )
     parser.option(
         "--each",
-        "with --model: every file is a test of its own (levels, assemblies); one table of all, and the name of each "
-        "file in those of --save, --report, --output and in the folder of --out",
+        "with --model: fit every file as a test of its own (levels, assemblies) and print one table; the name of each "
+        "file is added to the files of --save, --report, --output and to the folder of --out",
     )
     parser.option(
         "--find-wrong-channels",
-        "with --model: look for a channel of the opposite sign, or two exchanged ones, with which the models fit; a "
-        "warning names what was found",
+        "with --model: search for a channel of opposite sign or two exchanged channels that the models contradict",
     )
 
 
 def run_model(args: argparse.Namespace) -> int:
     """Carry out the command with --model; the caller turns exceptions into messages."""
     _check_options(args)
+    return _run_each(args) if args.each else _run_one(args)
+
+
+def _run_one(args: argparse.Namespace) -> int:
+    """Fit one test."""
     out = Output(args)
-    tests = [[path] for path in args.files] if args.each else [list(args.files)]
-    stems = _stems(args.files) if args.each else [""]
+    _, content, written = _one(args, out)
+    out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
+    out.give({"model": str(args.model), **content, "written": [str(path) for path in written]})
+    return 0
+
+
+def _run_each(args: argparse.Namespace) -> int:
+    """Fit every file as a test of its own: one that fails, or Ctrl-C, leaves the finished ones as they are."""
+    out, failures, interrupt = Output(args), Failures(args), Interrupt()
     fits: dict[str, Fit] = {}
-    contents, failed, written = [], 0, []
-    start = time.monotonic()
-    for done, (files, stem) in enumerate(zip(tests, stems, strict=True)):
-        own = _for_one(args, files, stem)
-        if args.each:
-            own.turn = f" ({done + 1} of {len(tests)}{time_left(time.monotonic() - start, done, len(tests))})"
-        try:
-            fit, content, paths = _one(own, out)
-        except (FileContentError, OSError, ValueError) as error:
-            if not args.each:
-                raise
-            failed += 1
-            complain("error", f"{files[0]}: {error}")
-            continue
-        fits[stem] = fit
-        written += paths
-        contents.append(content)
-    if args.each and fits:
+    contents, written, total = [], [], len(args.files)
+    with waiting("tests") as count, interrupt.kept_back(fits):
+        for done, (path, stem) in enumerate(zip(args.files, _stems(args.files), strict=True)):
+            count(done, total)
+            with failures.noted(str(path)):
+                fits[stem], content, paths = _one(_for_one(args, path, stem), out)
+                contents.append(content)
+                written += paths
+            with waiting(f"intervals of {path.name}"):
+                result = _summary(fits[stem]) if stem in fits else "failed"
+            out.say(f"{stem} ({done + 1} of {total}): {result}")
+    if fits:
         found = [text for stem, fit in fits.items() for text in messages_of(fit.findings, stem)]
         out.say(*_table(fits), *(f"warning: {text}" for text in found))
         out.warn(*found)
@@ -97,9 +103,11 @@ def run_model(args: argparse.Namespace) -> int:
             write_file(path, _csv(fits))
             written.append(path)
     out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
-    content = {"tests": contents, "failed": failed} if args.each else contents[0]
-    out.give({"model": str(args.model), **content, "written": [str(path) for path in written]})
-    return 1 if failed else 0
+    content = {"tests": contents, "failed": failures.found, "written": [str(path) for path in written]}
+    out.give({"model": str(args.model), **content})
+    failures.complain()
+    interrupt.resume()
+    return 1 if failures.found else 0
 
 
 def _check_options(args: argparse.Namespace) -> None:
@@ -108,10 +116,12 @@ def _check_options(args: argparse.Namespace) -> None:
     given += ["--damping"] if args.damping != "auto" else []
     given += ["--cross"] if args.cross != "zero" else []
     if given:
-        verb = "is" if len(given) == 1 else "are"
-        raise UsageError(f"{', '.join(given)} {verb} of fits without models: with --model, {args.model} says the joint")
+        verb, pronoun = ("is", "it") if len(given) == 1 else ("are", "them")
+        raise UsageError(
+            f"{listed(given)} {verb} for fits without models; leave {pronoun} out, since {args.model} defines the joint"
+        )
     if args.each and args.export is not None and args.output is None:
-        raise UsageError("--export of several tests needs --output: the cards of each go into a file of their own")
+        raise UsageError("--export of several tests needs files; add --output")
 
 
 def _stems(files: Sequence[Path]) -> list[str]:
@@ -120,36 +130,33 @@ def _stems(files: Sequence[Path]) -> list[str]:
     if len(set(stems)) < len(stems):
         stems = [f"{path.parent.name}_{path.stem}" for path in files]
     if len(set(stems)) < len(stems):
-        raise UsageError("two files of --each have the same name")
+        raise UsageError("two files of --each have the same name; rename one")
     return stems
 
 
-def _for_one(args: argparse.Namespace, files: list[Path], stem: str) -> argparse.Namespace:
-    """Return the options for one test: its files, and names of what is written."""
+def _for_one(args: argparse.Namespace, path: Path, stem: str) -> argparse.Namespace:
+    """Return the options for one test: its file, and names of what is written."""
     own = argparse.Namespace(**vars(args))
-    own.files = files
-    if stem:
-        for name in ("save", "report", "output"):
-            path = getattr(args, name)
-            setattr(own, name, None if path is None else path.with_name(f"{path.stem}_{stem}{path.suffix}"))
-        own.out = None if args.out is None else args.out / stem
+    own.files = [path]
+    for name in ("save", "report", "output"):
+        target = getattr(args, name)
+        setattr(own, name, None if target is None else target.with_name(f"{target.stem}_{stem}{target.suffix}"))
+    own.out = None if args.out is None else args.out / stem
     return own
 
 
 def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], list[Path]]:
     """Fit one test, write what is wanted; return the fit, its content for JSON, and what was written."""
-    try:
-        frfs = read_receptances(args)
-    except FileContentError as error:
-        hint = "; with --each every file is a test of its own" if len(args.files) > 1 else ""
-        raise FileContentError(f"{error}{hint}") from error
-    measured = measured_assembly(args.model, frfs, bands=args.band)
-    measured = replace(measured, setups=setups_with_gains(args, measured.setups, measured.h.shape))
+    with waiting(f"reading {file_names(args)}"):
+        frfs = _read(args)
+        measured = measured_assembly(args.model, frfs, bands=args.band)
+        measured = replace(measured, setups=setups_with_gains(args, measured.setups, measured.h.shape))
     request = _request(args, measured)
-    _look_at(measured)
+    with waiting(f"data checks of {file_names(args)}"):
+        _look_at(measured)
     if not args.each:
         out.say(*_heading(args, measured))
-    with waiting(f"fit of {file_names(args)}{getattr(args, 'turn', '')}"), warnings.catch_warnings():
+    with waiting(f"fit of {file_names(args)}"), warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
         fit = measured.fit(noise=args.noise, find_wrong_channels=args.find_wrong_channels,
@@ -185,6 +192,15 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
         "cards": text or None,
     }
     return fit, content, written
+
+
+def _read(args: argparse.Namespace) -> FrfSet:
+    """Read the files of one test."""
+    try:
+        return read_receptances(args)
+    except FileContentError as error:
+        hint = "; use --each if every file is a test of its own" if len(args.files) > 1 else ""
+        raise FileContentError(f"{error}{hint}") from error
 
 
 def _request(args: argparse.Namespace, measured: MeasuredAssembly) -> CardRequest | None:
@@ -255,6 +271,12 @@ def _rows(fit: Fit) -> Iterator[tuple[str, str, float, float, float, float]]:
     for name, eta in fit.loss_factors.items():
         yield name, "1", eta.value, eta.std_error, eta.low, eta.high
     yield from (row for one, row in of_fit if one.origin != "joint")
+
+
+def _summary(fit: Fit) -> str:
+    """Return the first parameters of the joint in one line."""
+    rows = [f"{name} {_cell(value, low, high)}" for name, _, value, _, low, high in _rows(fit)]
+    return some_of(rows[: sum(one.origin == "joint" for one in fit.parameters)], 4)
 
 
 def _table(fits: dict[str, Fit]) -> Iterator[str]:

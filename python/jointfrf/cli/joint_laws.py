@@ -27,24 +27,24 @@ _SPRINGS = {
 def _law(text: str) -> tuple[str, str]:
     dof, equals, word = text.partition("=")
     if not (dof.strip() and equals):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a DOF and a law like y=standard-linear-solid")
+        raise argparse.ArgumentTypeError(f"{text!r} is no DOF with a law; use the form y=standard-linear-solid")
     word = word.strip()
     if word not in LAW_WORDS:
         hint = did_you_mean(word, LAW_WORDS)
-        raise argparse.ArgumentTypeError(f"{word!r} is not one of {', '.join(LAW_WORDS)}{hint}")
+        raise argparse.ArgumentTypeError(f"unknown law {word!r}; use one of {', '.join(LAW_WORDS)}{hint}")
     return dof.strip(), word
 
 
 def add_law_arguments(parser: CommandParser) -> None:
-    """Describe what says the laws of the joint."""
+    """Describe the options for the laws of the joint."""
     parser.option(
         "--law DOF=LAW",
-        f"law of a joint DOF, once for each: y=standard-linear-solid, theta=rigid; {', '.join(LAW_WORDS)}, a spring "
-        "with --damping (auto: viscous); no values are needed",
+        f"law of a joint DOF, once for each DOF: y=standard-linear-solid, theta=rigid; one of {', '.join(LAW_WORDS)}; "
+        "a spring takes the damping of --damping (auto: viscous)",
         _law,
         repeated=True,
     )
-    parser.option("--joint FILE", "joint of laws in a TOML file, with values where the fit may start", Path)
+    parser.option("--joint FILE", "TOML file of a joint of laws, with initial values", Path)
 
 
 def joint_of_laws(args: argparse.Namespace, dofs: Sequence[str]) -> LawJoint | None:
@@ -58,27 +58,25 @@ def joint_of_laws(args: argparse.Namespace, dofs: Sequence[str]) -> LawJoint | N
     if args.law is None and args.joint is None:
         return None
     if args.law is not None and args.joint is not None:
-        raise UsageError("--law and --joint both say the laws of the joint: name one of them")
+        raise UsageError("--law and --joint both give the laws; leave out one")
     if args.cross != "zero":
-        raise UsageError(f"--cross {args.cross} is for springs: cross terms of laws stand in the file of --joint")
+        raise UsageError(f"--cross {args.cross} is for springs; give cross terms of laws in the file of --joint")
     if args.method != ["compliance"]:
-        raise UsageError("laws are fitted by method compliance alone")
+        raise UsageError("laws need method compliance; leave out --method")
     joint = _of_words(args.law, args.damping) if args.joint is None else _of_file(args)
     if args.export is not None and any(law.constant_terms is None for law in joint.laws.values()):
-        raise UsageError(
-            "--export: cards hold no law that depends on frequency: say --save, then jointfrf export --frequency HZ"
-        )
+        raise UsageError("--export takes no frequency-dependent law; use --save, then jointfrf export --frequency HZ")
     if not joint.laws:
-        raise UsageError("all joint DOFs are rigid: there is no law to fit")
+        raise UsageError("all joint DOFs are rigid; give at least one DOF another law")
     if sorted(joint.dofs) != sorted(dofs):
         given = f"{args.joint} has the DOFs" if args.law is None else "--law names the DOFs"
-        raise UsageError(f"{given} {', '.join(joint.dofs)}, and --dofs {', '.join(dofs)}: each takes one law")
+        raise UsageError(f"{given} {', '.join(joint.dofs)}, and --dofs {', '.join(dofs)}; give each DOF one law")
     return joint
 
 
 def _of_file(args: argparse.Namespace) -> LawJoint:
     if args.damping != "auto":
-        raise UsageError("--damping is for springs, and --joint says the laws: leave it out")
+        raise UsageError("--damping is for springs, and --joint gives the laws; leave out --damping")
     joint = read_joint_file(args.joint).joint
     return LawJoint.of_joint(joint) if isinstance(joint, Joint) else joint
 
@@ -87,13 +85,13 @@ def _of_words(laws: Sequence[tuple[str, str]], damping: str) -> LawJoint:
     named = [dof for dof, _ in laws]
     twice = [dof for dof in named if named.count(dof) > 1]
     if twice:
-        raise UsageError(f"--law: {twice[0]} has two laws")
+        raise UsageError(f"--law: {twice[0]} has two laws; give each DOF one")
     tables: list[dict[str, Any]] = []
     for dof, word in laws:
         values = start_values(word)
         if word == "spring":
             if damping == "none":
-                raise UsageError("--damping none leaves --law spring no damping: leave --law out, springs need none")
+                raise UsageError("--damping none leaves --law spring without damping; leave out --law")
             values = {"k": values["k"], **_SPRINGS[damping]}
         tables.append({"dof": dof, "law": word} | ({} if word == "rigid" else {"values": values}))
     joint = read_joint_table(TomlTable({"law": tables}, "--law"))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import re
 import warnings
-from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
@@ -21,7 +20,16 @@ from jointfrf.assembly_file.read import read_assembly_file
 from jointfrf.cli.measured_file import READING, add_joint_arguments, read_receptances, words
 from jointfrf.cli.measured_joint import measured_joint
 from jointfrf.cli.parser import CommandParser, one_of
-from jointfrf.cli.usage import Output, UsageError, check_folder, check_out, waiting, warn_of_ignored
+from jointfrf.cli.usage import (
+    Failures,
+    Interrupt,
+    Output,
+    UsageError,
+    check_folder,
+    check_out,
+    waiting,
+    warn_of_ignored,
+)
 from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
 from jointfrf.extras import check_extras
 from jointfrf.files import write_file
@@ -52,52 +60,68 @@ class _Test(NamedTuple):
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Stiffness and loss factor of a joint over the amplitude of its motion: one file a level, each fitted with "
-        "the models of assembly.toml or, as by identify, to FRFs at the joint; or the backbone of a mode. Laws over "
-        "amplitude are fitted to all."
+        "Find stiffness and loss factor of a joint over the amplitude of its relative motion. The data are one file of "
+        "FRFs for each level, fitted with the models of assembly.toml or (as by identify) at the joint, or the "
+        "backbone of a mode. Laws over amplitude are fitted to all levels."
     )
+    parser.requires("FILE", "--level", "--model")
+    parser.requires("FILE", "--level", "--j", "--k", "--dofs")
+    parser.requires("--table", "--model")
+    parser.requires("--backbone", "--channel", "--model")
+    parser.examples += [
+        "jointfrf levels --table cases/iwan-beam/tests.csv --model cases/iwan-beam/assembly.toml --held B/25:y",
+        "jointfrf levels --backbone cases/iwan-beam/backbone.csv --model cases/iwan-beam/assembly.toml --channel A/1:y",
+    ]
     parser.add_argument("files", type=Path, nargs="*", metavar="FILE", help="measured FRFs, one file for each level")
-    parser.option("--model FILE", "assembly.toml, as for identify; without it FRFs at the joint (--j, --k)", Path)
+    parser.option(
+        "--model FILE", "assembly.toml, as for identify; without it the FRFs are at the joint (--j, --k)", Path
+    )
     parser.option(
         "--table FILE",
-        "instead of files: a table (CSV) with columns file and level, perhaps label; files beside it",
+        "CSV table of the tests instead of FILE: columns file (relative to the table), level, optionally label",
         Path,
     )
-    parser.heading("what was held in each test")
+    parser.heading("the controlled quantity of each test")
     parser.option(
         "--held WHAT",
-        "what had its level on all lines: force (default), a response as the models name it (B/25:y; without models as "
+        "quantity that had its level on all lines: force, a response as the models name it (B/25:y; without models as "
         "the file does, 101:+y), or joint:DOF for the relative motion of a joint DOF (joint:theta_z)",
         default="force",
     )
     parser.option(
-        "--level LEVEL,...", "level of each file, peak value: N; of a response by --motion; m or rad", _numbers
-    )
+        "--level LEVEL,...", "peak level of each file: N for a force, by --motion for a response, m or rad for a joint",
+        _numbers,
+    )  # fmt: skip
     parser.option(
-        "--motion", "what the level of a response is: m, m/s or m/s^2", get_args(MotionQuantity), "displacement"
+        "--motion", "quantity of the level of a response: m, m/s or m/s^2", get_args(MotionQuantity), "displacement"
     )
     parser.heading("the backbone of a mode, instead of files")
     parser.option(
         "--backbone FILE",
-        "a table (CSV) with columns frequency (Hz), amplitude (peak, by --motion) and damping (ratio) or, of tests at "
-        "phase resonance, force (peak, N); perhaps label",
+        "CSV table with columns frequency (Hz), amplitude (peak, by --motion) and damping (ratio) or, for tests at "
+        "phase resonance, force (peak, N); optionally label",
         Path,
     )
-    parser.option("--channel DOF", "where the amplitude was measured, and the force acts, as the models name it: A/1:y")
-    parser.option("--dof DOF", "DOF of the joint that is found, where more than one has a law")
-    parser.option("--errors FREQUENCY,DAMPING", "relative standard errors (0.001,0.05); damping: or of force", _numbers)
+    parser.option("--channel DOF", "DOF of the measured amplitude and of the force, as the models name it: A/1:y")
+    parser.option("--dof DOF", "joint DOF to be found, if several have a law")
+    parser.option(
+        "--errors FREQUENCY,DAMPING", "relative standard errors of frequency and of damping or force", _numbers,
+        [0.001, 0.05],
+    )  # fmt: skip
     parser.heading("the fits")
-    parser.option("--noise LEVEL", "relative noise of the FRFs, 0.01 for 1 %% (default: from them)", float)
-    parser.option("--laws NAME,...", f"laws over amplitude that are fitted: {', '.join(AMPLITUDE_LAWS)} (all)", _laws)
+    parser.option(
+        "--noise LEVEL", "relative noise of the FRFs; 0.01 means 1 %%", float, otherwise="estimated from the FRFs"
+    )
+    parser.option("--laws NAME,...", "laws over amplitude to be fitted", _laws, list(AMPLITUDE_LAWS))
     add_joint_arguments(parser)
     parser.set_defaults(points=None)  # one joint point
     parser.heading("results")
-    parser.option("--report FILE", "write a page (HTML) with figures of stiffness and loss factor over amplitude", Path)
-    parser.option("--output FILE", "write the result as a table (CSV)", Path)
+    parser.option("--report FILE", "HTML page with figures of stiffness and loss factor over amplitude", Path)
+    parser.option("--output FILE", "CSV table of the result", Path)
     parser.option(
         "--joints DIR",
-        "write the joint of each level, springs of its secant stiffness and damping, as DIR/LABEL.toml: export writes "
-        "cards of it, couple takes it",
+        "folder for the joint of each level, springs of its secant stiffness and damping, as LABEL.toml for export and "
+        "couple",
         Path,
     )
 
@@ -106,7 +130,7 @@ def _numbers(word: str) -> list[float]:
     try:
         return [float(one) for one in word.split(",")]
     except ValueError:
-        raise argparse.ArgumentTypeError(f"must be numbers between commas, not {word!r}") from None
+        raise argparse.ArgumentTypeError(f"{word!r} is no list of numbers; separate them by commas") from None
 
 
 def _laws(word: str) -> list[str]:
@@ -116,10 +140,12 @@ def _laws(word: str) -> list[str]:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     if args.model is not None:
-        warn_of_ignored(args, _OF_THE_JOINT, "it is for FRFs at the joint, without --model")
+        warn_of_ignored(args, _OF_THE_JOINT, "--model defines the joint")
     elif args.backbone is not None or args.j is None:
-        why = "a backbone needs it" if args.backbone is not None else "name the joint in the files by --j, --k, --dofs"
-        raise UsageError(f"--model is missing: assembly.toml says what both parts and the joint are; {why}")
+        why = (
+            "add it for a backbone" if args.backbone is not None else "add it, or locate the joint by --j, --k, --dofs"
+        )
+        raise UsageError(f"--model is missing; {why}")
     for option, path in (("--report", args.report), ("--output", args.output)):
         check_folder(option, path)
     if args.report is not None:
@@ -127,8 +153,11 @@ def run(args: argparse.Namespace) -> int:
         check_extras("matplotlib")
     if args.joints is not None:
         check_out("--joints", args.joints)
-    out = Output(args)
-    found, about = _of_fits(args) if args.backbone is None else _of_backbone(args)
+    out, failures, interrupt = Output(args), Failures(args), Interrupt()
+    if args.backbone is None:
+        found, about = _of_fits(args, failures, interrupt)
+    else:
+        found, about = _of_backbone(args)
     written = []
     if args.report is not None:
         written.append(write_levels(found, args.report, command=args.typed))
@@ -140,15 +169,18 @@ def run(args: argparse.Namespace) -> int:
     out.say(found, *([""] if written else []), *(f"wrote {path}" for path in written))
     out.warn(*found.warnings)
     by_dof = {dof: [_by_name(one) for one in own] for dof, own in found.levels.items()}
-    out.give(about | asdict(replace(found, joints={})) | {"levels": by_dof, "written": [str(path) for path in written]})
-    return 1 if found.refused else 0
+    content = {"levels": by_dof, "failed": failures.found, "written": [str(path) for path in written]}
+    out.give(about | asdict(replace(found, joints={})) | content)
+    failures.complain()
+    interrupt.resume()
+    return 1 if found.refused or failures.found else 0
 
 
 def _write_joints(found: JointLevels, folder: Path) -> list[Path]:
     """Write the joint of each level by its label."""
     names = {label: re.sub(r"^\.|[^\w.+-]", "_", label) for label in found.joints}
     if len(set(names.values())) < len(names):
-        raise UsageError("--joints: two labels give the same name of a file")
+        raise UsageError("--joints: two labels give the same file name; change a label")
     folder.mkdir(parents=True, exist_ok=True)
     return [write_joint(folder / f"{names[label]}.toml", joint) for label, joint in found.joints.items()]
 
@@ -157,37 +189,39 @@ def _by_name(one: JointLevel) -> dict[str, Any]:
     return asdict(one) | {"stiffness": one.stiffness._asdict(), "loss_factor": one.loss_factor._asdict()}
 
 
-def _of_fits(args: argparse.Namespace) -> tuple[JointLevels, dict[str, Any]]:
-    """Return the levels of files, and what they were."""
-    warn_of_ignored(args, ("--channel", "--dof", "--errors"), "there is no --backbone")
-    tests = _tests(args)
-    drives = [_drive(args, one) for one in tests]
+def _of_fits(args: argparse.Namespace, failures: Failures, interrupt: Interrupt) -> tuple[JointLevels, dict[str, Any]]:
+    """Return the levels of files, and the tests they are from."""
+    warn_of_ignored(args, ("--channel", "--dof", "--errors"), "no --backbone is given")
+    tests, fits = _tests(args), dict[_Test, tuple[Fit, Drive]]()
+    drives = {one: _drive(args, one) for one in tests}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they are among the findings
         warnings.simplefilter("ignore", ConvergenceWarning)
-        fits = [_fit(args, *each) for each in zip(tests, drives, strict=True)]
+        with waiting("tests") as count, interrupt.kept_back(fits):
+            for done, test in enumerate(tests):
+                count(done, len(tests))
+                with failures.noted(str(test.path)):
+                    fits[test] = _fit(args, test, drives[test])
+        if not fits:
+            raise FileContentError("; ".join(failures.found.values()))
         with waiting("motion of the joint"):
-            found = levels(*zip(*fits, strict=True), labels=[one.label for one in tests], laws=_chosen(args))
-    return found, {"sources": [str(one.path) for one in tests], "drives": [asdict(one) for one in drives]}
-
-
-def _chosen(args: argparse.Namespace) -> Sequence[str]:
-    return AMPLITUDE_LAWS if args.laws is None else args.laws
+            found = levels(*zip(*fits.values(), strict=True), labels=[one.label for one in fits], laws=args.laws)
+    return found, {"sources": [str(one.path) for one in fits], "drives": [asdict(drives[one]) for one in fits]}
 
 
 def _of_backbone(args: argparse.Namespace) -> tuple[JointLevels, dict[str, Any]]:
     """Return the levels of the backbone of a mode, and where it stands."""
     if args.files or args.table is not None or args.level is not None:
-        raise UsageError("--backbone has the levels: leave out files, --table and --level")
+        raise UsageError("--backbone contains the levels; leave out files, --table and --level")
     if args.channel is None:
-        raise UsageError("--channel is missing: where the amplitude of the backbone was measured, such as A/1:y")
+        raise UsageError("--channel is missing; name the DOF of the measured amplitude, such as A/1:y")
     warn_of_ignored(args, ("--held", "--noise", "--band", *READING), "no file of FRFs is read")
     backbone = _backbone(args)
     file, lines = read_assembly_file(args.model), np.unique(backbone.freq_hz)
     parts = file.parts(lines)
     file, _ = file.located(parts)
     whole = file.assembly(lines, parts, [backbone.channel])
-    found = backbone_levels(whole, backbone, dof=args.dof, laws=_chosen(args))
+    found = backbone_levels(whole, backbone, dof=args.dof, laws=args.laws)
     return found, {"sources": [str(args.backbone)]}
 
 
@@ -198,31 +232,30 @@ def _backbone(args: argparse.Namespace) -> Backbone:
     names = ("frequency", "amplitude", second)
     for name in names:
         if name not in table.heading:
-            raise FileContentError(f"{path}: has no column {name}{did_you_mean(name, table.heading)}")
+            raise FileContentError(f"{path}: column {name} is missing; add it{did_you_mean(name, table.heading)}")
     if {"force", "damping"} <= set(table.heading):
-        raise FileContentError(f"{path}: has damping and force: of a test at phase resonance leave out damping")
+        raise FileContentError(f"{path}: has damping and force; leave out damping for tests at phase resonance")
     if len(set(table.heading)) < len(table.heading):
-        raise FileContentError(f"{path}: two columns have the same name")
+        raise FileContentError(f"{path}: two columns have the same name; rename one")
     for where, cells in table.rows:
         for name, cell in zip(table.heading, cells, strict=True):
             if name in names:
                 try:
                     table.number(cell)
                 except ValueError:
-                    raise FileContentError(f"{where}: the {name} {cell!r} is no number") from None
+                    raise FileContentError(f"{where}: {name} {cell!r} is no number; correct it") from None
             columns.setdefault(name, []).append(cell)
     if not columns:
-        raise FileContentError(f"{path}: has no rows")
-    errors = args.errors or [0.001, 0.05]
-    if len(errors) != 2:
-        raise UsageError("--errors takes two numbers, of frequency and of damping")
+        raise FileContentError(f"{path}: has no rows; add one for each test")
+    if len(args.errors) != 2:
+        raise UsageError(f"--errors has {len(args.errors)} numbers; give two, of frequency and of damping")
     freq, amplitude, other = (np.array([table.number(cell) for cell in columns[name]]) for name in names)
     with np.errstate(all="ignore"):  # a frequency of zero is an error below
         amplitude = amplitude / (2 * np.pi * freq) ** get_args(MotionQuantity).index(args.motion)
     try:
         return Backbone(
-            args.channel, freq, amplitude, **{second: other}, freq_error=errors[0],
-            damping_error=errors[1], labels=tuple(columns.get(_LABEL, ())),
+            args.channel, freq, amplitude, **{second: other}, freq_error=args.errors[0],
+            damping_error=args.errors[1], labels=tuple(columns.get(_LABEL, ())),
         )  # fmt: skip
     except ValueError as error:
         raise FileContentError(f"{path}: {error}") from error
@@ -231,14 +264,14 @@ def _backbone(args: argparse.Namespace) -> Backbone:
 def _tests(args: argparse.Namespace) -> list[_Test]:
     """Return files, names and levels, from the table or from the command line."""
     if args.table is not None and (args.files or args.level is not None):
-        raise UsageError("--table names files and levels: leave out those of the command line")
+        raise UsageError("--table names files and levels; leave out FILE and --level")
     if args.table is not None:
         return _of_table(args.table)
     if not args.files:
-        raise UsageError("name the files of all levels, or a table of them by --table")
+        raise UsageError("no files are given; name one for each level, or a table by --table")
     given = [] if args.level is None else args.level
     if len(given) != len(args.files):
-        raise UsageError(f"--level must name {len(args.files)} levels, one for each file, not {len(given)}")
+        raise UsageError(f"--level has {len(given)} levels; give {len(args.files)}, one for each file")
     labels = [path.stem for path in args.files]
     if len(set(labels)) < len(labels):
         labels = [str(path) for path in args.files]
@@ -249,19 +282,19 @@ def _of_table(path: Path) -> list[_Test]:
     table = read_text_table(path)
     for name in (_FILE, _LEVEL):
         if name not in table.heading:
-            raise FileContentError(f"{path}: has no column {name}{did_you_mean(name, table.heading)}")
+            raise FileContentError(f"{path}: column {name} is missing; add it{did_you_mean(name, table.heading)}")
     if len(set(table.heading)) < len(table.heading):
-        raise FileContentError(f"{path}: two columns have the same name")
+        raise FileContentError(f"{path}: two columns have the same name; rename one")
     found = []
     for where, cells in table.rows:
         row = dict(zip(table.heading, cells, strict=True))
         try:
             level = table.number(row[_LEVEL])
         except ValueError:
-            raise FileContentError(f"{where}: the level {row[_LEVEL]!r} is no number") from None
+            raise FileContentError(f"{where}: level {row[_LEVEL]!r} is no number; correct it") from None
         found.append(_Test(path.parent / row[_FILE], row.get(_LABEL, Path(row[_FILE]).stem), level))
     if not found:
-        raise FileContentError(f"{path}: has no rows")
+        raise FileContentError(f"{path}: has no rows; add one for each test")
     return found
 
 
@@ -280,7 +313,8 @@ def _drive(args: argparse.Namespace, test: _Test) -> Drive:
 def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Drive]:
     """Return the fit of a test, and what was held by the names of the fit."""
     own = argparse.Namespace(**vars(args) | {"files": [test.path]})
-    frfs = read_receptances(own)
+    with waiting(f"reading {test.path.name}"):
+        frfs = read_receptances(own)
     if args.model is not None:
         measured = measured_assembly(args.model, frfs, bands=args.band)
         with waiting(f"fit of {test.path.name}"):
@@ -289,7 +323,9 @@ def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Driv
     channels = [str(one) for one in joint.responses.channels]
     if drive.held == "response" and drive.channel not in channels:
         hint = did_you_mean(drive.channel, channels)
-        raise UsageError(f"--held {drive.channel}: {test.path.name} has {', '.join(channels)} at the joint{hint}")
+        raise UsageError(
+            f"--held {drive.channel}: {test.path.name} has no such channel; use one of {', '.join(channels)}{hint}"
+        )
     with waiting(f"fit of {test.path.name}"):
         known = joint.known(frfs)
         fit = identify(frfs.freq_hz, joint.h, joint.dofs, args.band, noise=args.noise, accept_bent=True, **known)

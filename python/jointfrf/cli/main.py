@@ -7,16 +7,14 @@ import shlex
 import signal
 import sys
 import threading
-import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
+from contextlib import ExitStack, contextmanager, nullcontext, redirect_stderr, redirect_stdout
 from types import FrameType
 from typing import Any, TextIO, cast
 
 from jointfrf.cli.configuration import with_configuration
 from jointfrf.cli.parser import COMMANDS, command_parser, top_parser
-from jointfrf.cli.usage import OptionWarning, UsageError, complain
-from jointfrf.extras import MissingPackageError
+from jointfrf.cli.usage import EXPECTED, UsageError, complain, sentence, shown_progress, shown_warnings
 from jointfrf.spelling import did_you_mean
 
 __all__ = ["main"]
@@ -55,40 +53,30 @@ def _answer(words: list[str]) -> int:
             status = _run(words, stop_if_interrupted)
         sys.stdout.flush()
         return status
-    except UsageError as error:
-        complain("error", error)
-        return _USAGE_ERROR
-    except OSError as error:
-        complain("error", f"{f'{error.filename}: ' if error.filename else ''}{error.strerror or error}")
-    except (ValueError, TypeError, ArithmeticError, MemoryError, RuntimeError, MissingPackageError) as error:
-        few = "not enough memory for what was asked for: fewer nodes, a narrower band or fewer realisations need less"
-        complain("error", few if isinstance(error, MemoryError) and not str(error) else error)
+    except EXPECTED as error:
+        complain("error", sentence(error))
+        return _USAGE_ERROR if isinstance(error, UsageError) else _FAILURE
     except KeyboardInterrupt:
         complain("error", "interrupted")
         return _INTERRUPTED
-    return _FAILURE
 
 
 def _run(words: list[str], stop_if_interrupted: Callable[[], None]) -> int:
     """Run one command."""
     name = words[0]
     if name not in COMMANDS:
-        hint = did_you_mean(name, COMMANDS) or ": jointfrf --help lists them"
-        raise UsageError(f"there is no command {name!r}{hint}")
+        hint = did_you_mean(name, COMMANDS) or "; see jointfrf --help"
+        raise UsageError(f"unknown command {name!r}{hint}")
     parser = command_parser(name)  # imports the command
     stop_if_interrupted()
     args = parser.parse_words(words[1:])
     args.typed = shlex.join(["jointfrf", *words])
     args.warned = []
-
-    def show(message: Warning | str, *_: Any, **__: Any) -> None:
-        args.warned.append(str(message))
-        complain("warning", message)
-
-    with warnings.catch_warnings(), _limited(args.limit_gb):
-        warnings.simplefilter("always", OptionWarning)
-        warnings.showwarning = show
-        status: int = args.action(with_configuration(args, parser, name))
+    args.stop_if_interrupted = stop_if_interrupted
+    with shown_warnings(args.warned), _limited(args.limit_gb):
+        parser.check_required(with_configuration(args, parser, name))
+        with nullcontext() if args.quiet else shown_progress(name):
+            status: int = args.action(args)
         return status
 
 

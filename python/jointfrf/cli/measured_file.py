@@ -80,7 +80,7 @@ class Nodes(NamedTuple):
         found = [node for node in self.numbers if node in there]
         if missing or not found:
             which = f"node {missing[0]}" if missing else f"nodes {self.numbers[0]} to {self.numbers[-1]}"
-            raise FileContentError(f"{source} has no FRF at {which}; it has nodes {shown_nodes(there)}")
+            raise FileContentError(f"{source} has no FRF at {which}; use nodes of {shown_nodes(there)}")
         return found
 
 
@@ -112,13 +112,13 @@ def nodes(text: str) -> Nodes:
         except ValueError:
             low, high = 0, 0
         if not 0 < low <= high:
-            raise argparse.ArgumentTypeError(f"{word!r} is no node number or range like 102,104 or 101:116")
+            raise argparse.ArgumentTypeError(f"{word!r} is no node number or range; use the form 102,104 or 101:116")
         if high - low >= _MOST_NODES:
-            raise argparse.ArgumentTypeError(f"{word} are more than {_MOST_NODES} nodes")
+            raise argparse.ArgumentTypeError(f"{word} are too many nodes; name at most {_MOST_NODES}")
         found += range(low, high + 1)
         single |= set() if colon else {low}
     if not found:
-        raise argparse.ArgumentTypeError(f"{text!r} names no nodes: 102,104 or 101:116")
+        raise argparse.ArgumentTypeError(f"{text!r} names no nodes; use the form 102,104 or 101:116")
     return Nodes(tuple(dict.fromkeys(found)), frozenset(single))
 
 
@@ -129,24 +129,24 @@ def joint_dofs(text: str) -> list[str]:
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
     if not found:
-        raise argparse.ArgumentTypeError(f"{text!r} names no DOFs, like y,theta_x")
+        raise argparse.ArgumentTypeError(f"{text!r} names no DOFs; use the form y,theta_x")
     return list(found)
 
 
-def numbers(text: str, count: int, like: str) -> tuple[float, ...]:
-    """Return some finite numbers between commas."""
+def numbers(text: str, count: int, like: tuple[str, str]) -> tuple[float, ...]:
+    """Return some finite numbers between commas; `like` is what they are and an example, for the message."""
     try:
         found = tuple(float(word) for word in words(text))
     except ValueError:
         found = ()
     if len(found) != count or not np.isfinite(found).all():
-        raise argparse.ArgumentTypeError(f"{text!r} is not like {like}")
+        raise argparse.ArgumentTypeError(f"{text!r} is no {like[0]}; use the form {like[1]}")
     return found
 
 
 def point(text: str) -> tuple[float, ...]:
     """Return the coordinates of a point, m."""
-    return numbers(text, 3, "x,y,z in m: 0.0625,0,0")
+    return numbers(text, 3, ("point", "x,y,z in m: 0.0625,0,0"))
 
 
 def parse_band(text: str) -> tuple[float, float]:
@@ -154,7 +154,7 @@ def parse_band(text: str) -> tuple[float, float]:
     try:
         low, high = (float(part) for part in text.split(":"))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a band like 200:550 (Hz)") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is no band; use the form 200:550 (Hz)") from None
     return low, high
 
 
@@ -165,13 +165,13 @@ def add_file_arguments(parser: CommandParser) -> None:
         nargs="+",
         type=Path,
         metavar="FILE",
-        help=f"FRFs of the points around the joint: {format_names()}; several files of one test become one",
+        help=f"FRFs of the points around the joint: {format_names()}; several files of one test are merged",
     )
     add_joint_arguments(parser)
     parser.option(
         "--points NAMES",
-        "several joint points at once, bolt1,bolt2: one node of --j and of --k for each, with all of --dofs in the "
-        "file; DOFs are then bolt1.x, ...",
+        "names of several joint points, bolt1,bolt2: one node of --j and of --k for each, with all of --dofs in the "
+        "file; the DOFs are named bolt1.x, ...",
         words,
     )
 
@@ -180,43 +180,43 @@ def add_joint_arguments(parser: CommandParser) -> None:
     """Describe the points on both sides, the DOFs, the bands, the quantity: what belongs to a project."""
     parser.heading("the joint in the file")
     parser.option("--j NODES", "nodes on side j: 102,104 or 101:116", nodes)
-    parser.option("--k NODES", "nodes on side k; without --at in the same order", nodes)
+    parser.option("--k NODES", "nodes on side k; without --at in the order of --j", nodes)
     parser.option(
-        "--dofs DOFS", "joint DOFs out of x,y,z,theta_x,theta_y,theta_z (or rx,ry,rz), like y,theta_x", joint_dofs
+        "--dofs DOFS", "joint DOFs out of x,y,z,theta_x,theta_y,theta_z (or rx,ry,rz), such as y,theta_x", joint_dofs
     )
     parser.option(
         "--at X,Y,Z",
-        "reference point of the joint in m: its DOFs are then those of virtual points there, from all channels of "
-        "the nodes; without it, the nodes of each side lie along a line",
+        "reference point of the joint in m: its DOFs are the DOFs of virtual points there, from all channels of the "
+        "nodes; without it, the nodes of each side lie along a line",
         point,
     )
-    parser.option("--at-k X,Y,Z", "reference point of side k, where it is another one", point)
+    parser.option("--at-k X,Y,Z", "reference point of side k in m", point, otherwise="the point of --at")
     parser.option(
         "--channels TABLE",
-        "TOML or CSV table of sensors and impacts: side, position, direction; where the file of FRFs lacks them "
-        "(needs --at)",
+        "TOML or CSV table of sensors and impacts (side, position, direction), if the file of FRFs lacks them; needs "
+        "--at",
         Path,
     )
     parser.option(
         "--spacing METRES",
-        "distance between neighbouring nodes along a line, where the file has no coordinates; needs --axis",
+        "distance between neighbouring nodes along a line, if the file has no coordinates; needs --axis",
         float,
     )
-    parser.option("--axis", "direction of the line of nodes, with --spacing", ("x", "y", "z"))
+    parser.option("--axis", "direction of the line of nodes; needs --spacing", ("x", "y", "z"))
     parser.option("--band LOW:HIGH", "frequency band in Hz; may be repeated", parse_band, repeated=True)
     add_reading_arguments(parser)
 
 
 def add_reading_arguments(parser: CommandParser) -> None:
-    """Describe the options that say what the FRFs of files are, and where they stand in them."""
+    """Describe the options that state the quantity of the FRFs and their place in files."""
     parser.option(
-        "--quantity", "what the FRFs are, where the file does not say", ("receptance", "mobility", "accelerance")
+        "--quantity", "quantity of the FRFs, if the file does not state it", ("receptance", "mobility", "accelerance")
     )
-    parser.option("--force-quantity", "take --quantity also where the file says something else")
+    parser.option("--force-quantity", "use --quantity even if the file states another quantity")
     parser.option(
         "--map FIELD=NAME",
-        f"which field of a MATLAB, NPZ or HDF5 file is what: {', '.join(_FIELDS)}; responses and excitations also as "
-        "names (responses=1:x,2:x), axes as freq,out,in in their order; may be repeated",
+        f"name of a field in a MATLAB, NPZ or HDF5 file: {', '.join(_FIELDS)}; responses and excitations also as names "
+        "(responses=1:x,2:x), axes as freq,out,in in their order; may be repeated",
         _field,
         repeated=True,
     )
@@ -226,17 +226,17 @@ def _field(text: str) -> tuple[str, str]:
     field, equals, name = text.partition("=")
     if not equals or field not in _FIELDS or not name:
         hint = did_you_mean(field, _FIELDS) if equals else ""
-        raise argparse.ArgumentTypeError(f"{text!r} is not FIELD=NAME with a field out of {', '.join(_FIELDS)}{hint}")
+        raise argparse.ArgumentTypeError(f"{text!r} is not FIELD=NAME; use a field of {', '.join(_FIELDS)}{hint}")
     return field, name
 
 
 def reading_options(args: argparse.Namespace) -> dict[str, Any]:
     """Return what the command line says of the files, as `jointfrf.io.read_frfs` takes it."""
     if args.force_quantity and args.quantity is None:
-        raise UsageError("--force-quantity needs --quantity")
+        raise UsageError("--force-quantity without a quantity; add --quantity")
     mapping = dict(args.map or ())
     if len(mapping) < len(args.map or ()):
-        raise UsageError("--map names a field twice")
+        raise UsageError("--map names a field twice; name each field once")
     return {"quantity": args.quantity, "force_quantity": args.force_quantity, "mapping": mapping}
 
 

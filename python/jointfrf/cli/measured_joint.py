@@ -24,7 +24,7 @@ from jointfrf.channels.joint_channels import (
 )
 from jointfrf.channels.point_lines import Interface, interface
 from jointfrf.cli.measured_file import Nodes, file_names, in_some_band, shown_nodes
-from jointfrf.cli.usage import UsageError
+from jointfrf.cli.usage import UsageError, listed
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import Channel, ChannelPlace, JointSide, places_of_nodes
@@ -281,11 +281,11 @@ def _points(args: argparse.Namespace, nodes: tuple[list[int], list[int]]) -> Int
     """Return the DOFs of several joint points, one node on each side for each."""
     if not len(args.points) == len(nodes[0]) == len(nodes[1]):
         raise UsageError(
-            f"--points names {len(args.points)}, --j {len(nodes[0])} and --k {len(nodes[1])}: each joint point has one "
-            "node on either side"
+            f"--points names {len(args.points)}, --j {len(nodes[0])} and --k {len(nodes[1])}; give one node on each "
+            "side for each joint point"
         )
     if len(set(args.points)) != len(args.points):
-        raise UsageError("--points names a joint point twice")
+        raise UsageError("--points names a joint point twice; give different names")
     pairs = [node_dofs(j, k, args.dofs, {}) for j, k in zip(*nodes, strict=True)]
     n = len(args.dofs)
     channels = [channel for side in range(2) for one in pairs for channel in one.channels[side * n : (side + 1) * n]]
@@ -318,22 +318,21 @@ def _check_options(args: argparse.Namespace, frfs: FrfSet, table: object) -> Non
         what = "; ".join(needs[name][1] for name in missing)
         verb = "is" if len(missing) == 1 else "are"
         nodes = "" if missing == ["--dofs"] else f" ({file_names(args)} has nodes {known})"
-        names = ", ".join([*missing[:-2], " and ".join(missing[-2:])])
-        raise UsageError(f"{names} {verb} missing: {what}{nodes}")
+        raise UsageError(f"{listed(missing)} {verb} missing: {what}{nodes}")
     if args.points is not None:
         for name, value in (("--at", args.at), ("--spacing", args.spacing), ("a table of channels", table)):
             if value is not None:
-                raise UsageError(f"--points takes the nodes themselves as joint points: {name} does not go with it")
+                raise UsageError(f"--points takes the nodes as joint points; leave out {name}")
     if args.at is None:
         for name, value in (("--at-k", args.at_k), ("a table of channels", table)):
             if value is not None:
-                raise UsageError(f"{name} needs --at X,Y,Z, the reference point of the joint")
+                raise UsageError(f"{name} needs a reference point of the joint; add --at X,Y,Z")
     if (args.spacing is None) != (args.axis is None):
-        raise UsageError("--spacing and --axis go together")
+        raise UsageError("only one of --spacing and --axis is given; give both")
     if args.spacing is not None and args.at is not None:
-        raise UsageError("--spacing is for nodes along a line, --at for virtual points: name one of them")
+        raise UsageError("--spacing is for nodes along a line, --at for virtual points; leave out one")
     if args.spacing is not None and not args.spacing > 0:
-        raise UsageError(f"--spacing must be positive, not {args.spacing:g}")
+        raise UsageError(f"--spacing is {args.spacing:g}; give a positive number")
 
 
 def _on_sides(
@@ -384,13 +383,13 @@ def _point_lines(
                 places[node]["xyz".index(args.axis)] = args.spacing * i
     if len(nodes[0]) != len(nodes[1]):
         raise UsageError(
-            f"--j and --k must name the same number of nodes, not {len(nodes[0])} and {len(nodes[1])}; virtual points "
-            "(--at X,Y,Z) take any"
+            f"--j and --k name {len(nodes[0])} and {len(nodes[1])} nodes; give equal numbers, or use virtual points by "
+            "--at X,Y,Z"
         )
     for node in (*nodes[0], *nodes[1]):
         if node not in places and (len(nodes[0]) > 1 or any(is_rotation(dof) for dof in args.dofs)):
             raise FileContentError(
-                f"{frfs.source} has no coordinates of node {node}: say --spacing and --axis, or --at and --channels"
+                f"{frfs.source} has no coordinates of node {node}; add --spacing and --axis, or --at and --channels"
             )
     at = {node: places.get(node, np.zeros(3)) for node in (*nodes[0], *nodes[1])}
     try:
@@ -398,4 +397,4 @@ def _point_lines(
     except ValueError as error:
         if args.spacing is not None or any(node not in frfs.coordinates for node in at):
             raise
-        raise ValueError(f"{error}; or say --at X,Y,Z for virtual points of all channels") from error
+        raise ValueError(f"{error}; or add --at X,Y,Z for virtual points of all channels") from error

@@ -10,6 +10,7 @@ from typing import Any
 from jointfrf.assembly_file.keys import AssemblyKeys, PartsKeys
 from jointfrf.assembly_file.template import TEMPLATE
 from jointfrf.cases.catalogue import KINDS
+from jointfrf.cli.parser import CommandParser, one_of
 from jointfrf.cli.usage import Output, UsageError
 from jointfrf.files import OwnFolder
 from jointfrf.toml.documents import key_template, schema_of
@@ -24,16 +25,20 @@ _STUDY = "study"
 _ASSEMBLY = "assembly"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Write the case.toml of a new case, with a comment beside each key, and a JSON Schema with which editors "
-        f"complete it. It runs as it is. KIND is {', '.join(KINDS)}, or {_STUDY}: a case with a design of factors; or "
-        f"{_ASSEMBLY}: an assembly.toml for identify --model."
+        "Write the case.toml of a new case, with a comment for each key, and a JSON Schema for editors. The case runs "
+        f"unchanged. KIND is {', '.join(KINDS)}, or {_STUDY}: a case with a design of factors; or {_ASSEMBLY}: an "
+        "assembly.toml for identify --model."
     )
-    parser.add_argument("kind", metavar="KIND", choices=(*KINDS, _STUDY, _ASSEMBLY), help="kind of the case")
-    parser.add_argument("folder", nargs="?", type=Path, metavar="FOLDER", help="new folder of the case (my-KIND)")
-    parser.add_argument("--schema", action="store_true", help="instead: print the JSON Schema of case.toml")
+    parser.examples.append("jointfrf new known-joint my-case")
+    kinds = (*KINDS, _STUDY, _ASSEMBLY)
+    parser.add_argument("kind", metavar="KIND", choices=kinds, type=one_of(kinds), help="kind of the case")
+    parser.add_argument(
+        "folder", nargs="?", type=Path, metavar="FOLDER", help="new folder of the case (default: my-KIND)"
+    )
+    parser.option("--schema", "print the JSON Schema of case.toml instead")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -49,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     folder = options.folder or Path(f"my-{options.kind}")
     case = folder / "case.toml"
     if case.exists() or case.is_symlink():
-        raise UsageError(f"{case} exists: name another folder")
+        raise UsageError(f"{case} exists; name another folder")
     design = {"study": {"realisations": 20, "factors": {"noise": [0.01, 0.05], "lines": [50, 200]}}}
     examples = {**top.examples, **(design if is_study else {})}
     own = OwnFolder(folder).make()
@@ -70,7 +75,7 @@ def _new_assembly(options: argparse.Namespace) -> int:
     folder = options.folder or Path("my-assembly")
     path, beside = folder / "assembly.toml", folder / "assembly.schema.json"
     if path.exists() or path.is_symlink():
-        raise UsageError(f"{path} exists: name another folder")
+        raise UsageError(f"{path} exists; name another folder")
     own = OwnFolder(folder).make()
     own.write(beside.name, schema)
     own.write(path.name, TEMPLATE)

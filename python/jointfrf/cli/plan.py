@@ -18,7 +18,7 @@ from jointfrf.cases.known_joint.keys import KnownJointCase
 from jointfrf.cases.substructures import MeasuredStructure, ModelStructure
 from jointfrf.cli.frf import add_line_arguments, lines_of
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_folder, waiting, warn_of_ignored
+from jointfrf.cli.usage import Output, UsageError, check_folder, listed, waiting, warn_of_ignored
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import FileContentError
 from jointfrf.extras import check_extras
@@ -44,43 +44,58 @@ _OF_PARTS = (
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Plan a test of an assembly whose parts are known: which sensors and hits show the joint best, what they will "
-        "know of each parameter, what the next one would add, and where in frequency the knowledge lies."
+        "Plan a test of an assembly of parts with models: the sensors and impacts that determine the joint best, the "
+        "expected error of each parameter, the gain of one more sensor or impact, and the information by frequency."
     )
+    parser.requires("--band", "--step")
+    parser.examples += [
+        "jointfrf plan cases/lap-beam/assembly.toml --band 20:1000 --step 2 --noise 0.02 --floor 0.01 --budget 5",
+        "jointfrf plan cases/3.3-beams-1mm/case.toml --band 10:500 --step 1 --spacings 0.001,0.005,0.02",
+    ]
     parser.add_argument(
-        "model", type=Path, metavar="ASSEMBLY", help="assembly.toml with the joint that is expected, or case.toml"
+        "model", type=Path, metavar="ASSEMBLY", help="assembly.toml with the expected joint, or case.toml"
     )
     add_line_arguments(parser)
     parser.option(
-        "--sensors DOF,...", "places where a sensor could be: A/7:y,B/@0.1,0,0:y; by default of all nodes", _dofs
+        "--sensors DOF,...",
+        "possible places of sensors: A/7:y,B/@0.1,0,0:y",
+        _dofs,
+        otherwise="translations of --candidates nodes",
     )
-    parser.option("--hits DOF,...", "places that could be hit or shaken; by default as for sensors", _dofs)
-    parser.option("--keep-sensors DOF,...", "sensors that are there in any case", _dofs)
-    parser.option("--keep-hits DOF,...", "hits that are made in any case", _dofs)
-    parser.option("--candidates N", "nodes of each part that are looked at, far from each other", int, _CANDIDATES)
+    parser.option("--hits DOF,...", "possible places of impacts or shakers", _dofs, otherwise="as for --sensors")
+    parser.option("--keep-sensors DOF,...", "sensors that are in every plan", _dofs)
+    parser.option("--keep-hits DOF,...", "impacts that are in every plan", _dofs)
+    parser.option("--candidates N", "number of nodes of each part, far from each other", int, _CANDIDATES)
     parser.heading("noise and sensors")
-    parser.option("--noise LEVEL", "standard deviation of an average relative to the FRF", _positive, 0.01)
-    parser.option("--floor LEVEL", "the same of the accelerance that does not depend on the FRF, m/(s^2 N)", _positive)
-    parser.option("--averages N", "averages of each FRF", _positive, 1.0)
+    parser.option("--noise LEVEL", "relative noise of one average of the FRFs; 0.01 means 1 %%", _positive, 0.01)
+    parser.option("--floor LEVEL", "noise floor of the accelerances, independent of the FRF, m/(s^2 N)", _positive)
+    parser.option("--averages N", "number of averages of each FRF", _positive, 1.0)
     parser.option(
-        "--sensor-mass KG", "mass of each sensor that the models do not have: what it moves is shown", _positive
+        "--sensor-mass KG", "mass of each sensor, if the models lack it: prints the change of the parameters", _positive
     )
     parser.option(
         "--spacings M,...",
-        "of a case.toml: what rotations by finite differences over these spacings move: 0.001,0.005", _spacings,
+        "spacings of finite differences for rotations, m, with case.toml: prints the change of the parameters: "
+        "0.001,0.005", _spacings,
     )  # fmt: skip
-    parser.heading("what is wanted")
-    parser.option("--targets NAME,...", "parameters to be found: k_y,c_y; all of the joint by default", _dofs)
+    parser.heading("the goal")
+    parser.option("--targets NAME,...", "parameters to be found: k_y,c_y", _dofs, otherwise="all of the joint")
     parser.option(
-        "--criterion NAME", "A: mean of squared relative errors, D: volume of their ellipsoid", ("A", "D"), "A"
+        "--criterion", "A: mean of the squared relative errors, D: volume of their ellipsoid", ("A", "D"), "A"
     )
     parser.option("--within ERROR", "relative error at which the plan ends: 0.02", _positive)
-    parser.option("--budget COST", "what sensors and hits may cost together", _positive)
-    parser.option("--sensor-price COST", "of one sensor", _positive, 1.0)
-    parser.option("--hit-price COST", "of one hit", _positive, 1.0)
-    parser.option("--spread S", "relative spread of assemblies: how many must be tested, with --next", _positive)
-    parser.option("--next WIDTH", "half width wanted of the interval of the next assembly, relative: 0.3", _positive)
-    parser.option("--report FILE", "write a page (HTML) with sensors, hits and where the knowledge lies", Path)
+    parser.option("--budget COST", "largest total price of sensors and impacts", _positive)
+    parser.option("--sensor-price COST", "price of one sensor", _positive, 1.0)
+    parser.option("--hit-price COST", "price of one impact", _positive, 1.0)
+    parser.option(
+        "--spread S", "relative spread between assemblies: prints the number of assemblies to test; needs --next",
+        _positive,
+    )  # fmt: skip
+    parser.option(
+        "--next WIDTH", "relative half width of the prediction interval of the next assembly: 0.3; needs --spread",
+        _positive,
+    )  # fmt: skip
+    parser.option("--report FILE", "HTML page with sensors, impacts and the information by frequency", Path)
 
 
 def _positive(word: str) -> float:
@@ -89,7 +104,7 @@ def _positive(word: str) -> float:
     except ValueError:
         found = -1.0
     if not 0 < found < float("inf"):
-        raise argparse.ArgumentTypeError(f"must be a number above zero, not {word!r}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no number above zero; give one")
     return found
 
 
@@ -106,7 +121,7 @@ def _dofs(word: str) -> list[str]:
         else:
             found.append(part.strip())
     if not all(found):
-        raise argparse.ArgumentTypeError(f"must be DOFs between commas, A/7:y,B/3:y, not {word!r}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no list of DOFs; use the form A/7:y,B/3:y")
     return found
 
 
@@ -117,13 +132,12 @@ def run(args: argparse.Namespace) -> int:
     if args.report is not None:
         check_extras("jinja2")
     if (args.spread is None) != (args.next is None):
-        raise UsageError("--spread and --next belong together: --spread 0.1 --next 0.3")
+        raise UsageError("only one of --spread and --next is given; give both, such as --spread 0.1 --next 0.3")
     freq = lines_of(args)
-    if freq is None:
-        raise UsageError("--band LOW:HIGH and --step HZ are missing: the lines that will be measured")
+    assert freq is not None  # --step is required
     if args.model.is_dir() or args.model.name == _CASE:
         return _of_case(args, freq, out)
-    warn_of_ignored(args, ("--spacings",), "a test with models takes translations as they are")
+    warn_of_ignored(args, ("--spacings",), "it is for case.toml")
     file = read_assembly_file(args.model)
     file.check_values()
     parts = file.parts(freq)
@@ -135,7 +149,7 @@ def run(args: argparse.Namespace) -> int:
     for name, dofs in (("--sensors", chosen[0] + kept[0]), ("--hits", chosen[1] + kept[1])):
         check_dofs(parts, file.keys, name, dofs)
     if args.sensors is not None and args.hits is not None:
-        warn_of_ignored(args, ("--candidates",), "--sensors and --hits name them")
+        warn_of_ignored(args, ("--candidates",), "--sensors and --hits name the candidates")
     used = list(dict.fromkeys(dof for own in (*chosen, *kept) for dof in own))
     with waiting(f"plan of {args.model.name}"):
         assembly = file.assembly(freq, parts, used)
@@ -168,10 +182,10 @@ def _of_case(args: argparse.Namespace, freq: FloatArray, out: Output) -> int:
     """Say what FRFs between all joint DOFs of a case will know."""
     of_parts = [name for name in _OF_PARTS if name.removeprefix("--").replace("-", "_") in args.given]
     if of_parts:
-        raise UsageError(f"{', '.join(of_parts)}: a case has all FRFs between its joint DOFs, and nothing is chosen")
+        raise UsageError(f"a case has all FRFs between its joint DOFs; leave out {listed(of_parts)}")
     case, _ = read_case_and_kind(args.model if args.model.is_dir() else args.model.parent)
     if not isinstance(case, KnownJointCase):
-        raise FileContentError(f"{args.model}: a plan takes a case of two parts and a joint (kind known-joint)")
+        raise FileContentError(f"{args.model}: wrong kind of case; use a case of kind known-joint")
     case = replace(case, freq_hz=freq)
     exact = exact_frfs(case)
     biased = {f"{1e3 * spacing:g} mm": frfs_by_differences(case, spacing) for spacing in args.spacings or ()}
@@ -209,7 +223,7 @@ def _located(parts: Mapping[str, AssemblyPart], dofs: list[str]) -> list[str]:
 def _candidates(parts: Mapping[str, AssemblyPart], most: int) -> list[str]:
     """Return translations of nodes of all parts, far from each other."""
     if most < 1:
-        raise UsageError(f"--candidates must be at least 1, not {most}")
+        raise UsageError(f"--candidates is {most}; give at least 1")
     found: list[str] = []
     for letter, part in parts.items():
         if isinstance(part.keys, ReceptancesPart):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_folder, warn_of_ignored
+from jointfrf.cli.usage import Failures, Output, UsageError, check_folder, warn_of_ignored
 from jointfrf.errors import FileContentError
 from jointfrf.extras import check_extras
 from jointfrf.files import write_file
@@ -25,54 +25,69 @@ __all__ = ["add_arguments", "run"]
 
 #: The column of a table of tests that names the saved fit; and one that gives it another name than the file's.
 _FILE, _LABEL = "file", "label"
+#: Fits that can be pooled or compared.
+_FEWEST = 2
 
 
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         "Pool fits of the same joint in several assemblies, at several torques, on several days: mean, spread between "
-        "assemblies, which factor matters, who does not belong to the others, and the interval of the next assembly."
+        "assemblies, significant factors, outlying assemblies, and the prediction interval of the next assembly."
     )
+    parser.requires("FIT")
+    parser.requires("--table")
+    parser.examples += [
+        "jointfrf pool --table cases/bolted-round-robin/tests.csv --trend torque",
+        "jointfrf pool cases/bolted-round-robin/assembly_1_10_Nm.json cases/bolted-round-robin/assembly_1_15_Nm.json "
+        "cases/bolted-round-robin/assembly_2_10_Nm.json --factor assembly=1,1,2",
+    ]
     parser.add_argument("files", type=Path, nargs="*", metavar="FIT", help="JSON files of identify --save")
     parser.option(
         "--table FILE",
-        "instead of files: a table (CSV) with a column file, perhaps label, and one for each factor; files beside it",
+        "CSV table of the fits instead of FIT: columns file (relative to the table), optionally label, and one column "
+        "for each factor",
         Path,
     )
     parser.option(
         "--factor NAME=GROUP,...",
-        "the group of each file: assembly=1,1,2,2 (files of one assembly are repeats), day=mon,mon,tue,tue",
+        "group of each file: assembly=1,1,2,2 (files of one assembly are repeats), day=mon,mon,tue; may be repeated",
         _factor,
         repeated=True,
     )
+    parser.option("--trend NAME", "numeric factor with a power law: torque; may be repeated", str, repeated=True)
     parser.option(
-        "--trend NAME", "a factor whose numbers act by themselves, as a power law: torque", str, repeated=True
-    )
-    parser.option(
-        "--common ERROR", "relative standard error that all files share (0.01), or files of a group (day=0.01)",
+        "--common ERROR",
+        "relative standard error that all files share (0.01), or all files of a group (day=0.01); may be repeated",
         _common, repeated=True,
     )  # fmt: skip
-    parser.option("--parameters NAME,...", "parameters to be pooled, loss factors (eta_y) included", _names)
-    parser.option("--probability P", "of the intervals", _probability, 0.95)
-    parser.option("--transfer", "test instead whether one joint explains all files, each of another structure")
     parser.option(
-        "--spread S", "with --transfer: relative spread between assemblies that is no difference", _share, 0.0
+        "--parameters NAME,...", "parameters to be pooled, or loss factors (eta_y)", _names,
+        otherwise="all that the fits share",
+    )  # fmt: skip
+    parser.option("--probability P", "coverage probability of the intervals", _probability, 0.95)
+    parser.option(
+        "--transfer", "test whether one joint explains all files, each of another structure, instead of pooling"
     )
-    parser.option("--report FILE", "write a page (HTML) with a forest plot of each parameter", Path)
-    parser.option("--output FILE", "write the result as a table (CSV)", Path)
+    parser.option(
+        "--spread S", "relative spread between assemblies that is no significant difference; needs --transfer", _share,
+        0.0,
+    )  # fmt: skip
+    parser.option("--report FILE", "HTML page with a forest plot of each parameter", Path)
+    parser.option("--output FILE", "CSV table of the result", Path)
 
 
 def _names(word: str) -> list[str]:
     names = [one.strip() for one in word.split(",")]
     if not all(names):
-        raise argparse.ArgumentTypeError(f"must be names between commas, not {word!r}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no list of names; separate them by commas")
     return names
 
 
 def _factor(word: str) -> tuple[str, list[str]]:
     name, equals, groups = word.partition("=")
     if not (name and equals and groups):
-        raise argparse.ArgumentTypeError(f"must be NAME=GROUP,GROUP,..., not {word!r}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no factor; use the form NAME=GROUP,GROUP,...")
     return name, _names(groups)
 
 
@@ -82,21 +97,21 @@ def _share(word: str) -> float:
     except ValueError:
         found = -1.0
     if not 0 <= found < float("inf"):
-        raise argparse.ArgumentTypeError(f"must be a share such as 0.05, not {word!r}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no share; use a number such as 0.05")
     return found
 
 
 def _common(word: str) -> tuple[str, float]:
     name, equals, share = word.rpartition("=")
     if equals and not name:
-        raise argparse.ArgumentTypeError(f"must be ERROR or NAME=ERROR, not {word!r}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no error; use the form ERROR or NAME=ERROR")
     return name, _share(share)
 
 
 def _probability(word: str) -> float:
     found = _share(word)
     if not 0 < found < 1:
-        raise argparse.ArgumentTypeError(f"must lie between 0 and 1, not {word!r}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no probability; use a number between 0 and 1")
     return found
 
 
@@ -107,17 +122,18 @@ def run(args: argparse.Namespace) -> int:
         check_folder(option, path)
     if args.report is not None:
         check_extras("jinja2")
-    files, labels, factors = _tests(args)
-    fits = [load(path) for path in files]
+    failures = Failures(args)
+    files, fits, labels, factors = _loaded(_tests(args), failures)
     sources = [str(path) for path in files]
     if args.transfer:
         of_pool = ("--factor", "--trend", "--common", "--probability", "--report", "--output")
-        warn_of_ignored(args, of_pool, "it is of the pool, and --transfer only tests")
+        warn_of_ignored(args, of_pool, "--transfer only tests")
         compared = _transferred(args, fits, labels)
         out.say(compared)
-        out.give({"sources": sources, "transfer": asdict(compared)})
-        return 0
-    warn_of_ignored(args, ("--spread",), "it is of --transfer")
+        out.give({"sources": sources, "transfer": asdict(compared), "failed": failures.found})
+        failures.complain()
+        return 1 if failures.found else 0
+    warn_of_ignored(args, ("--spread",), "it is for --transfer")
     pooled = _pooled(args, fits, labels, factors)
     written = []
     if args.report is not None:
@@ -127,18 +143,38 @@ def run(args: argparse.Namespace) -> int:
         written.append(args.output)
     out.say(pooled, *([""] if written else []), *(f"wrote {path}" for path in written))
     out.warn(*pooled.warnings)
-    out.give({"sources": sources, **asdict(pooled), "written": [str(path) for path in written]})
-    return 0
+    content = {"failed": failures.found, "written": [str(path) for path in written]}
+    out.give({"sources": sources, **asdict(pooled), **content})
+    failures.complain()
+    return 1 if failures.found else 0
+
+
+def _loaded(
+    tests: tuple[list[Path], list[str], dict[str, Sequence[str]]], failures: Failures
+) -> tuple[list[Path], list[Fit], list[str], dict[str, Sequence[str]]]:
+    """Return files that are saved fits, their fits, labels and factors."""
+    files, labels, factors = tests
+    for name, groups in factors.items():
+        if len(groups) != len(files):
+            raise UsageError(f"--factor {name} has {len(groups)} groups; give {len(files)}, one for each file")
+    fits = dict[int, Fit]()
+    for i, path in enumerate(files):
+        with failures.noted(str(path)):
+            fits[i] = load(path)
+    if len(fits) < _FEWEST and failures.found:
+        raise FileContentError("; ".join(failures.found.values()))
+    own: dict[str, Sequence[str]] = {name: [groups[i] for i in fits] for name, groups in factors.items()}
+    return [files[i] for i in fits], list(fits.values()), [labels[i] for i in fits], own
 
 
 def _tests(args: argparse.Namespace) -> tuple[list[Path], list[str], dict[str, Sequence[str]]]:
     """Return files, labels and factors, from the table or from the command line."""
     if args.table is not None and (args.files or args.factor):
-        raise UsageError("--table names files and factors: leave out those of the command line")
+        raise UsageError("--table names files and factors; leave out FIT and --factor")
     if args.table is not None:
         return _of_table(args.table)
     if not args.files:
-        raise UsageError("name saved fits, or a table of them by --table")
+        raise UsageError("no fits are given; name files of identify --save, or a table by --table")
     labels = [path.stem for path in args.files]
     if len(set(labels)) < len(labels):
         labels = [str(path) for path in args.files]
@@ -148,9 +184,9 @@ def _tests(args: argparse.Namespace) -> tuple[list[Path], list[str], dict[str, S
 def _of_table(path: Path) -> tuple[list[Path], list[str], dict[str, Sequence[str]]]:
     table = read_text_table(path)
     if _FILE not in table.heading:
-        raise FileContentError(f"{path}: has no column {_FILE}{did_you_mean(_FILE, table.heading)}")
+        raise FileContentError(f"{path}: column {_FILE} is missing; add it{did_you_mean(_FILE, table.heading)}")
     if len(set(table.heading)) < len(table.heading):
-        raise FileContentError(f"{path}: two columns have the same name")
+        raise FileContentError(f"{path}: two columns have the same name; rename one")
     rows = [cells for _, cells in table.rows]
     columns = dict(zip(table.heading, map(list, zip(*rows, strict=True)), strict=True))
     files = [path.parent / name for name in columns.pop(_FILE, [])]
@@ -164,7 +200,7 @@ def _pooled(
     shared = dict(args.common or ())
     common: Any = shared.get("", 0.0) if set(shared) <= {""} else shared
     if isinstance(common, dict) and "" in common:
-        raise UsageError("--common: an error of all files and errors of groups: name the first as a factor, too")
+        raise UsageError("--common gives errors of all files and of groups; name a factor for the first, too")
     return pool(
         fits, labels=labels, factors=factors, trends=args.trend or (), common=common, parameters=args.parameters,
         probability=args.probability,

@@ -11,13 +11,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from queue import SimpleQueue
-from threading import Event, Lock
+from threading import Lock
 
 from jointfrf.cases.catalogue import UnknownCaseError, find_case, list_cases, run_case
 from jointfrf.cases.keys import Case
 from jointfrf.cases.workers import Workers, started_workers
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_out, positive, progress
+from jointfrf.cli.usage import Output, UsageError, check_out, positive, waiting
 from jointfrf.extras import check_extras
 from jointfrf.parallel.pool import available_cores
 from jointfrf.report.table import Table, as_text
@@ -30,11 +30,12 @@ _TOGETHER = 3
 
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
-    parser.description = "Run cases by name, number or folder; without any, all that come with jointfrf."
+    parser.description = "Run cases by name, number or folder; without any, all cases that come with jointfrf."
+    parser.examples.append("jointfrf run 3.1 --realisations 20 --out results")
     parser.add_argument("cases", nargs="*", metavar="CASE", help="name, number, or folder with a case.toml")
-    parser.option("--out DIR", "where results go (results)", Path, Path("results"))
-    parser.option("--realisations N", "instead of the number the case names", positive)
-    parser.option("--jobs N", "processes (all cores)", positive, available_cores())
+    parser.option("--out DIR", "folder for the results", Path, Path("results"))
+    parser.option("--realisations N", "number of realisations", positive, otherwise="the number in the case")
+    parser.option("--jobs N", "number of processes", positive, available_cores(), otherwise="all cores")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -47,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
         raise UsageError(error) from error
     folders = list(dict.fromkeys(folders))
     if not folders:
-        raise UsageError("no cases come with this installation: name a folder with a case.toml")
+        raise UsageError("this installation contains no cases; name a folder with a case.toml")
     twice = {folder.name for folder in folders if [f.name for f in folders].count(folder.name) > 1}
     if twice:
         raise UsageError(f"two cases are called {min(twice)}; run each with its own --out")
@@ -81,7 +82,11 @@ def _run_all(
         Their reports.
     """
     if workers.pool is None:
-        return [_run_one(folder, options, replace(workers, progress=progress(folder.name)), say) for folder in folders]
+        found = []
+        for folder in folders:
+            with waiting(folder.name) as count:
+                found.append(_run_one(folder, options, replace(workers, progress=count), say))
+        return found
     turn, begun, reports = Lock(), [], []
     for rank, folder in enumerate(folders):
         case = _Begun(folder.name)
@@ -89,9 +94,10 @@ def _run_all(
         begun.append((case, threads.submit(case.run, folder, options, at_work)))
     try:
         for case, done in begun:
-            for text in case.read():
-                say(text)
-            reports.append(done.result())
+            with waiting(case.name) as case.count:
+                for text in case.read():
+                    say(text)
+                reports.append(done.result())
     finally:
         threads.shutdown(wait=False, cancel_futures=True)
     return reports
@@ -101,18 +107,16 @@ class _Begun:
     """A case that is computed while an earlier one may still be read."""
 
     def __init__(self, name: str) -> None:
+        self.name = name
         self.said: SimpleQueue[str | None] = SimpleQueue()
-        self._progress = progress(name)
-        self._is_read = Event()
+        self.count: Callable[[int, int], None] = lambda done, total: None
 
     def show(self, done: int, total: int) -> None:
-        """Show the progress: the one line of a terminal is for the case that is read."""
-        if self._is_read.is_set():
-            self._progress(done, total)
+        """Show the progress, once the case is the one that is read."""
+        self.count(done, total)
 
     def read(self) -> Iterator[str]:
         """Give what the case says, until it ends."""
-        self._is_read.set()
         while (text := self.said.get()) is not None:
             yield text
 

@@ -10,11 +10,10 @@ from typing import Any, get_args
 
 from jointfrf.cases.catalogue import UnknownCaseError
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_out, positive, progress, warn_of_ignored
+from jointfrf.cli.usage import Output, UsageError, check_out, listed, positive, waiting, warn_of_ignored
 from jointfrf.extras import check_extras, import_extra
 from jointfrf.files import OwnFolder
 from jointfrf.parallel.pool import AnyExecutor, available_cores, check_processes, safe_environment
-from jointfrf.spelling import some_of
 from jointfrf.studies.design import Arrangement, StudyDesign, parse_factor
 from jointfrf.studies.result import StudyResult
 from jointfrf.studies.run import merge_studies, study
@@ -33,37 +32,43 @@ _EXECUTORS = ("processes", "threads", "loky", "mpi", "dask:ADDRESS")
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Estimate the joint of a case from many realisations of the noise, over a design of factors. What is finished "
-        "is kept in the folder: the same command goes on where it was stopped. `jointfrf study merge PART... --out "
-        "DIR` puts parts together."
+        "Estimate the joint of a case from many realisations of the noise, over a design of factors. Finished "
+        "realisations are kept in the folder: the same command continues an interrupted study. `jointfrf study merge "
+        "PART... --out DIR` merges parts."
     )
+    parser.usage = "jointfrf study CASE [options]\n       jointfrf study merge PART [PART ...] --out DIR [options]"
+    parser.examples.append("jointfrf study 3.1 --realisations 20 --factor noise=0.01,0.03 --out study")
     parser.add_argument(
         "words",
         nargs="+",
         metavar="CASE | merge PART...",
-        help="name, number, or folder with a case.toml; or merge and folders of parts",
+        help="name, number, or folder with a case.toml; or merge and the folders of parts",
     )
-    parser.option("--realisations N", "instead of the number the case names", _whole)
+    parser.option("--realisations N", "number of realisations", _whole, otherwise="the number in the case")
     parser.option(
         "--factor NAME=V,V,...",
-        "vary noise, spacing, lines, stiffness, damping, or a key of case.toml such as "
-        "frequency.last or joint.stiffness; a * before = multiplies; may be repeated",
+        "values of noise, spacing, lines, stiffness, damping, or of a key of case.toml such as frequency.last or "
+        "joint.stiffness; a * before = multiplies; may be repeated",
         default=[],
         repeated=True,
     )
-    every = "every combination of values, or one factor at a time (full)"
+    every = "full: every combination of values; one-at-a-time: one factor at a time"
     parser.option("--arrangement", every, get_args(Arrangement), "full")
-    own = "a method instead of those that the case names; may be repeated"
-    parser.option("--estimator WORD", own, default=[], repeated=True)
-    parser.option("--noise NAME", "a noise of the case, instead of all; may be repeated", default=[], repeated=True)
-    parser.option("--first N", "compute realisations from this one on, a part only", _whole)
-    parser.option("--count N", "how many of them", positive)
-    parser.option("--jobs N", "workers (all cores)", positive)
-    what = f"what the workers are: {', '.join(_EXECUTORS)} (processes)"
-    parser.option("--executor WORD", what, _executor, "processes")
-    parser.option("--out DIR", "where results go (studies/NAME of the case)", Path)
-    single = "write single realisations, too: parquet or npz"
-    parser.option("--values FORMAT", single, _format, [], repeated=True)
+    parser.option(
+        "--estimator WORD", "method of identification; may be repeated", default=[], repeated=True,
+        otherwise="the methods in the case",
+    )  # fmt: skip
+    parser.option(
+        "--noise NAME", "noise of the case; may be repeated", default=[], repeated=True, otherwise="all in the case"
+    )
+    parser.option("--first N", "first realisation of a part of the study; needs --count", _whole)
+    parser.option("--count N", "number of realisations of a part; needs --first", positive)
+    parser.option("--jobs N", "number of workers", positive, otherwise="all cores")
+    parser.option("--executor WORD", f"kind of workers: {', '.join(_EXECUTORS)}", _executor, "processes")
+    parser.option("--out DIR", "folder for the results", Path, otherwise="studies/NAME of the case")
+    parser.option(
+        "--values FORMAT", "file of single realisations: parquet or npz; may be repeated", _format, [], repeated=True
+    )
 
 
 def _whole(word: str) -> int:
@@ -72,13 +77,13 @@ def _whole(word: str) -> int:
 
 def _executor(word: str) -> str:
     if word not in _EXECUTORS[:-1] and not (word.startswith("dask:") and len(word) > len("dask:")):
-        raise argparse.ArgumentTypeError(f"must be one of {', '.join(_EXECUTORS)}, not {word!r}")
+        raise argparse.ArgumentTypeError(f"unknown executor {word!r}; use one of {', '.join(_EXECUTORS)}")
     return word
 
 
 def _format(word: str) -> str:
     if word not in ("parquet", "npz"):
-        raise argparse.ArgumentTypeError(f"must be parquet or npz, not {word!r}")
+        raise argparse.ArgumentTypeError(f"unknown format {word!r}; use parquet or npz")
     return word
 
 
@@ -107,21 +112,21 @@ def run(options: argparse.Namespace) -> int:
 
 def _merged(options: argparse.Namespace) -> StudyResult:
     if len(options.words) < 2 or options.out is None:
-        raise UsageError("merge without parts or --out; name the folders of parts, and --out DIR")
+        raise UsageError("folders of parts or --out are missing; use jointfrf study merge PART... --out DIR")
     warn_of_ignored(options, _OF_COMPUTING, "merge computes nothing")
     return merge_studies(options.words[1:], options.out)
 
 
 def _studied(options: argparse.Namespace, is_part: bool) -> StudyResult:
     if len(options.words) > 1:
-        raise UsageError(f"several cases, {some_of(options.words, 3)}; name one")
+        raise UsageError(f"several cases are given, {listed(options.words)}; name one")
     (case,) = options.words
     factors = _factors(options.factor)
     try:
         is_stated = factors or options.noise or options.estimator
         design = StudyDesign(factors, options.arrangement, options.noise, options.estimator) if is_stated else None
         name = Path(case).resolve().name if (Path(case) / "case.toml").is_file() else case
-        with _started(options.executor, options.jobs) as executor:
+        with _started(options.executor, options.jobs) as executor, waiting(name) as count:
             return study(
                 case,
                 options.out or _usual_folder(name),
@@ -130,7 +135,7 @@ def _studied(options: argparse.Namespace, is_part: bool) -> StudyResult:
                 part=_range(options) if is_part else None,
                 executor=executor,
                 jobs=options.jobs,
-                progress=progress(name),
+                progress=count,
             )
     except UnknownCaseError as error:
         raise UsageError(error) from error
@@ -151,14 +156,14 @@ def _factors(words: list[str]) -> dict[str, Any]:
         except ValueError as error:
             raise UsageError(f"--factor: {error}") from error
         if name in factors:
-            raise UsageError(f"--factor {name} is given twice; give all values in one")
+            raise UsageError(f"--factor: {name} is given twice; give it once")
         factors[name] = values
     return factors
 
 
 def _range(options: argparse.Namespace) -> range:
     if options.first is None or options.count is None:
-        raise UsageError("--first without --count, or --count without --first; give both")
+        raise UsageError("only one of --first and --count is given; give both")
     return range(options.first, options.first + options.count)
 
 
@@ -178,7 +183,9 @@ def _started(word: str, jobs: int | None) -> Iterator[AnyExecutor | None]:
     elif word == "mpi":
         futures, rank = import_extra("mpi4py.futures"), import_extra("mpi4py.MPI").COMM_WORLD.Get_rank()
         if rank:
-            raise UsageError("--executor mpi: start it as mpiexec -n N python -m mpi4py.futures -m jointfrf study ...")
+            raise UsageError(
+                "--executor mpi needs a launcher; start mpiexec -n N python -m mpi4py.futures -m jointfrf study ..."
+            )
         with futures.MPIPoolExecutor() as pool:
             yield pool
     elif word.startswith("dask:"):

@@ -6,39 +6,53 @@ import argparse
 import json
 import math
 import re
+import shutil
 import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from jointfrf.extras import MissingPackageError
 from jointfrf.spelling import cut, message, visible
 
 __all__ = [
+    "EXPECTED",
+    "Failures",
+    "Interrupt",
     "OptionWarning",
     "Output",
     "UsageError",
     "check_folder",
     "check_out",
     "complain",
-    "in_options",
+    "listed",
     "plain",
     "positive",
-    "progress",
-    "time_left",
+    "sentence",
+    "shown_progress",
+    "shown_warnings",
     "waiting",
     "warn_of_ignored",
 ]
 
 #: Seconds after which the speed so far predicts the time left; a line that changes twice a second is easily read.
 _SETTLED = 0.5
+#: Seconds to the first line of progress on a stream that is no terminal, and between lines; characters of a bar.
+FIRST_LINE, _NEXT_LINE, _BAR = 3.0, 10.0, 20
 
 
 class UsageError(Exception):
     """A wrong word on the command line."""
+
+
+#: Errors with a message for users.
+EXPECTED = (
+    UsageError, ValueError, TypeError, ArithmeticError, MemoryError, RuntimeError, OSError, MissingPackageError
+)  # fmt: skip
 
 
 class OptionWarning(UserWarning):
@@ -67,15 +81,37 @@ _WORDS = tuple(
 
 
 def complain(kind: str, about: object) -> None:
-    """Print a warning or an error as one line that does nothing to a terminal: the name of a file may hold anything."""
-    print(f"jointfrf: {kind}: {message(in_options(cut(str(about))))}", file=sys.stderr)
+    """Print a warning or an error as one line that does nothing to a terminal: a file may have any name."""
+    _LINE.clear()
+    print(f"jointfrf: {kind}: {message(_in_options(cut(str(about))))}", file=sys.stderr)
 
 
-def in_options(text: str) -> str:
-    """Return a message of the library with options of the command line for arguments of functions."""
+def _in_options(message: object) -> str:
+    """Return a message of the library without its level, with options of the command line for arguments."""
+    text = re.sub(r"^(?:warning|error): ", "", str(message))
     for python, option in _WORDS:
         text = python.sub(option, text)
     return text
+
+
+@contextmanager
+def shown_warnings(noted: list[str]) -> Iterator[None]:
+    """Show warnings as sentences, and note them; floating-point warnings of numpy mean nothing to a user."""
+
+    def show(message: Warning | str, *_: Any, **__: Any) -> None:
+        noted.append(str(message))
+        complain("warning", message)
+
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r".* encountered in ", RuntimeWarning)
+        warnings.simplefilter("always", OptionWarning)
+        warnings.showwarning = show
+        yield
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as a sentence lists them: a, b and c."""
+    return ", ".join([*names[:-2], " and ".join(names[-2:])])
 
 
 def warn_of_ignored(args: argparse.Namespace, names: Iterable[str], why: str) -> None:
@@ -83,7 +119,7 @@ def warn_of_ignored(args: argparse.Namespace, names: Iterable[str], why: str) ->
     found = [name for name in names if name.removeprefix("--").replace("-", "_") in args.given]
     if found:
         verb = "have" if found[1:] else "has"
-        warnings.warn(f"{' and '.join(found)} {verb} no effect: {why}", OptionWarning, stacklevel=2)
+        warnings.warn(f"{listed(found)} {verb} no effect: {why}", OptionWarning, stacklevel=2)
 
 
 class Output:
@@ -97,6 +133,7 @@ class Output:
     def say(self, *lines: object) -> None:
         """Print lines of text, unless JSON or nothing is wanted."""
         if lines and not (self._is_json or self._is_quiet):
+            _LINE.clear()
             print(*(visible(str(line), "\n\t") for line in lines), sep="\n", flush=True)
 
     def warn(self, *texts: object) -> None:
@@ -108,8 +145,9 @@ class Output:
     def give(self, content: Mapping[str, Any]) -> None:
         """Print the result as JSON where that is wanted, with all warnings at its top level."""
         if self._is_json:
-            warned = [in_options(cut(str(text))) for text in (*content.get("warnings", ()), *self._warned)]
+            warned = [_in_options(cut(str(text))) for text in (*content.get("warnings", ()), *self._warned)]
             whole = {**content, "warnings": list(dict.fromkeys(warned))}
+            _LINE.clear()
             print(json.dumps(plain(whole), indent=2, allow_nan=False))
 
 
@@ -137,9 +175,9 @@ def check_folder(option: str, path: Path | None) -> None:
         There is no such folder, or the path is a folder.
     """
     if path is not None and not path.parent.is_dir():
-        raise UsageError(f"{option}: there is no folder {path.parent}")
+        raise UsageError(f"{option}: folder {path.parent} does not exist; create it, or name another file")
     if path is not None and path.is_dir():
-        raise UsageError(f"{option}: {path} is a folder, not a file")
+        raise UsageError(f"{option}: {path} is a folder; name a file")
 
 
 def check_out(option: str, path: Path | None) -> None:
@@ -153,69 +191,197 @@ def check_out(option: str, path: Path | None) -> None:
     above = [] if path is None else [path, *path.parents]
     there = next((one for one in above if one.exists() or one.is_symlink()), None)
     if there is not None and not there.is_dir():
-        raise UsageError(f"{option}: {there} is a file, not a folder")
+        raise UsageError(f"{option}: {there} is a file; name a folder")
 
 
 def positive(word: str, least: int = 1) -> int:
     """Return a whole number of at least 1, or another least one."""
     if not word.isdecimal() or int(word) < least:
-        raise argparse.ArgumentTypeError(f"must be a whole number, at least {least}, not {word!r}")
+        raise argparse.ArgumentTypeError(f"{word!r} is no whole number of at least {least}; give one")
     return int(word)
 
 
-def _on_its_line(text: str) -> None:
-    """Write over the last line of the terminal."""
-    print(f"\r\x1b[K{visible(text)}", end="", file=sys.stderr, flush=True)
+class _Stage:
+    """A part of a command that takes time, and how much of it is done."""
 
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.start = self._counted_from = self._counted_at = time.monotonic()
+        self._done, self._total = 0, 0
 
-def progress(name: str) -> Callable[[int, int], None]:
-    """Return a counter in one line of a terminal, with the time that is left; silent elsewhere.
+    def count(self, done: int, total: int) -> None:
+        """Note how much is done; a part is finished when all is, and the next one may begin.
 
-    Calls may come from several threads, in another order than their counts: what was shown is never taken back.
-    """
-    if not sys.stderr.isatty():
-        return lambda done, total: None
-    start, lock = time.monotonic(), threading.Lock()
-    furthest = 0.0
-
-    def show(done: int, total: int) -> None:
-        nonlocal furthest
-        with lock:
+        Calls may come from several threads, in another order than their counts: progress is never taken back.
+        """
+        with _LOCK:
+            self._counted_at = time.monotonic()
             if done == total:
-                _on_its_line("")
-                furthest = 0.0
-            elif done / total >= furthest:
-                furthest = done / total
-                _on_its_line(f"{name}: {100 * done // total} %{time_left(time.monotonic() - start, done, total)}")
+                self._counted_from, self._done, self._total = self._counted_at, 0, 0
+            elif done * self._total >= self._done * total:
+                self._done, self._total = done, total
 
-    return show
+    @property
+    def share(self) -> float | None:
+        """Finished share of the stage; None if nothing counts."""
+        return self._done / self._total if self._total else None
+
+    def left(self, now: float) -> str:
+        """Return the finished share and the time left."""
+        if self.share is None:
+            return ""
+        spent = self._counted_at - self._counted_from
+        return f", {100 * self.share:.0f} %{_time_left(spent, now - self._counted_at, self._done, self._total)}"
 
 
-def time_left(spent: float, done: int, total: int) -> str:
-    """Say how long it will take at the speed so far, where that is known."""
-    if done == 0 or spent < _SETTLED:
-        return ""
-    left = spent * (total - done) / done
-    return f", about {left:.0f} s left" if left < 90 else f", about {left / 60:.0f} min left"
+#: The stages under way, each within the one before it.
+_STAGES: list[_Stage] = []
+_LOCK = threading.RLock()
+
+
+class _Line:
+    """The line of a terminal that shows the progress: other text takes its place."""
+
+    is_there = False
+
+    def write(self, text: str) -> None:
+        with _LOCK:
+            print(
+                f"\r\x1b[K{visible(text)}"[: 3 + shutil.get_terminal_size().columns],
+                end="",
+                file=sys.stderr,
+                flush=True,
+            )
+            self.is_there = bool(text)
+
+    def clear(self) -> None:
+        if self.is_there:
+            self.write("")
+
+
+_LINE = _Line()
+
+
+def _progress_text(now: float, *, bar: bool) -> str:
+    """Return the innermost stage with its time, and the share of the innermost stage that counts."""
+    with _LOCK:
+        stages = _STAGES[:]
+    counted = next((one for one in reversed(stages) if one.share is not None), None)
+    text = f"{stages[-1].name}: {now - stages[-1].start:.0f} s"
+    if counted is None:
+        return text
+    filled = "#" * int(_BAR * (counted.share or 0.0))
+    return f"{f'[{filled:-<{_BAR}}] ' if bar else ''}{text}{counted.left(now)}"
+
+
+def _show_progress(ended: threading.Event) -> None:
+    """Show the stage under way: on a terminal all the time, elsewhere a line now and then."""
+    shown = time.monotonic() + FIRST_LINE - _NEXT_LINE
+    is_terminal = sys.stderr.isatty()
+    while not ended.wait(_SETTLED):
+        now = time.monotonic()
+        if is_terminal:
+            _LINE.write(_progress_text(now, bar=True))
+        elif now - shown >= _NEXT_LINE:
+            shown = now
+            print(f"jointfrf: {visible(_progress_text(now, bar=False))}", file=sys.stderr, flush=True)
 
 
 @contextmanager
-def waiting(what: str) -> Iterator[None]:
-    """Show in one line of a terminal how long something has taken so far; silent elsewhere."""
-    if not sys.stderr.isatty():
-        yield
-        return
-    start, done = time.monotonic(), threading.Event()
+def shown_progress(command: str) -> Iterator[None]:
+    """Show what takes time inside, on standard error, until the end."""
+    ended = threading.Event()
+    clock = threading.Thread(target=_show_progress, args=(ended,), daemon=True)
+    with waiting(command):
+        clock.start()
+        try:
+            yield
+        finally:
+            ended.set()
+            clock.join()
+            _LINE.clear()
 
-    def show() -> None:
-        while not done.wait(_SETTLED):
-            _on_its_line(f"{what}: {time.monotonic() - start:.0f} s")
 
-    clock = threading.Thread(target=show, daemon=True)
-    clock.start()
+@contextmanager
+def waiting(stage: str) -> Iterator[Callable[[int, int], None]]:
+    """Name the stage of a command that is under way; yields what takes the number done and their total."""
+    found = _Stage(stage)
+    with _LOCK:
+        _STAGES.append(found)
     try:
-        yield
+        yield found.count
     finally:
-        done.set()
-        clock.join()
-        _on_its_line("")
+        with _LOCK:
+            _STAGES.remove(found)
+
+
+def _time_left(spent: float, since: float, done: int, total: int) -> str:
+    """Return the time left at the speed until the last count, some time since; nothing before the first count."""
+    if done == 0 or spent < _SETTLED:
+        return ""
+    left = max(0.0, spent * (total - done) / done - since)
+    return f", about {left:.0f} s left" if left < 90 else f", about {left / 60:.0f} min left"
+
+
+class Failures:
+    """Tests that failed, of several: none ends the other ones, and all are named at the end.
+
+    Attributes
+    ----------
+    found : dict of str to str
+        Sentences by the names of the tests.
+    """
+
+    def __init__(self, args: argparse.Namespace) -> None:
+        self._stop_if_interrupted: Callable[[], None] = args.stop_if_interrupted
+        self._is_first = True
+        self.found: dict[str, str] = {}
+
+    @contextmanager
+    def noted(self, name: str) -> Iterator[None]:
+        """Note that a test failed, and why; wrong usage ends the command at the first test."""
+        is_first, self._is_first = self._is_first, False
+        try:
+            yield
+        except Exception as error:
+            self._stop_if_interrupted()  # which may have ended in any error
+            if is_first and isinstance(error, UsageError):
+                raise
+            text = sentence(error)
+            self.found[name] = text if text.startswith(name) else f"{name}: {text}"
+
+    def complain(self) -> None:
+        """Print all failures."""
+        for text in self.found.values():
+            complain("error", text)
+
+
+def sentence(error: Exception) -> str:
+    """Return an error as a message shows it; one that is no fault of the input with its name."""
+    if isinstance(error, OSError):
+        return f"{f'{error.filename}: ' if error.filename else ''}{error.strerror or error}"
+    if isinstance(error, MemoryError) and not str(error):
+        return "not enough memory; use fewer nodes, a narrower band or fewer realisations"
+    return str(error) if isinstance(error, EXPECTED) else f"{type(error).__name__}: {error}"
+
+
+class Interrupt:
+    """Ctrl-C while several tests are computed: results of the finished ones are written before the command ends."""
+
+    def __init__(self) -> None:
+        self._has_come = False
+
+    @contextmanager
+    def kept_back(self, finished: Sized) -> Iterator[None]:
+        """Keep an interrupt back if something is finished."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            if not len(finished):
+                raise
+            self._has_come = True
+
+    def resume(self) -> None:
+        """Raise the interrupt that was kept back."""
+        if self._has_come:
+            raise KeyboardInterrupt

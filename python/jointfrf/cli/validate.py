@@ -10,7 +10,7 @@ from jointfrf.cli.couple import add_joint_arguments, coupled, renumbered, shifte
 from jointfrf.cli.frf import add_line_arguments, check_target, lines_of, read_structures
 from jointfrf.cli.measured_file import add_reading_arguments, reading_options
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, waiting
+from jointfrf.cli.usage import Output, waiting
 from jointfrf.errors import FileContentError
 from jointfrf.frf.merge import merge_frfs
 from jointfrf.identification.joint_file import read_joint_file
@@ -24,16 +24,21 @@ __all__ = ["add_arguments", "run"]
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Regenerate an assembly with a joint found and compare it with the measured one, by channel: amplitude (4.11) "
-        "and frequency (4.12) of the largest peak in the band, and the difference over the band. Take channels that "
-        "the joint was not identified from; or other parts than those of the identification, to which the joint is "
-        "transferred, and a test of their assembly."
+        "Compute an assembly with an identified joint and compare it with the measured assembly, by channel: amplitude "
+        "(4.11) and frequency (4.12) of the largest peak in the band, and the difference over the band. Use channels "
+        "that were not used in the identification, or transfer the joint to other parts and use a test of their "
+        "assembly."
+    )
+    parser.requires("--joint", "--j", "--k")
+    parser.examples.append(
+        "jointfrf validate cases/two-beams/a.toml cases/two-beams/b.toml assembly.uff --joint "
+        "cases/two-beams/joint.toml --j 11 --k 1 --renumber-b 100 --band 20:800"
     )
     parser.add_argument("a", type=Path, metavar="A", help="substructure A: file of FRFs, or model (.toml)")
     parser.add_argument("b", type=Path, metavar="B", help="substructure B")
     parser.add_argument("measured", nargs="+", type=Path, metavar="FILE", help="measured FRFs of the assembly")
     add_joint_arguments(parser)
-    parser.option("--output FILE", f"also write the regenerated FRFs: {format_names(written=True)}", Path)
+    parser.option("--output FILE", f"file for the regenerated FRFs: {format_names(written=True)}", Path)
     add_line_arguments(parser)
     add_reading_arguments(parser)
 
@@ -41,9 +46,6 @@ def add_arguments(parser: CommandParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
-    for name, value in (("--joint", args.joint), ("--j", args.j), ("--k", args.k)):
-        if value is None:
-            raise UsageError(f"{name} is missing: jointfrf validate A B FILE --joint FILE --j NODE --k NODE")
     if args.output is not None:
         check_target(args.output)
     found = read_joint_file(args.joint)
@@ -78,8 +80,8 @@ def _shared(measured: FrfSet, assembly: FrfSet) -> tuple[FrfSet, list[str]]:
     unused = list(dict.fromkeys(str(c) for side in sides for c in side if (c.node, c.axis) not in known))
     if not rows or not columns:
         raise FileContentError(
-            f"{measured.source} and the parts share no {'response' if not rows else 'excitation'}: nodes of B are "
-            "renumbered by --renumber-b N"
+            f"{measured.source} and the parts share no {'response' if not rows else 'excitation'}; renumber the nodes "
+            "of B by --renumber-b N"
         )
     own = replace(
         measured,

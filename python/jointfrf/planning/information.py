@@ -56,7 +56,7 @@ def expected_noise(noise: float, floor: float, averages: float) -> ExpectedNoise
     level, constant = as_not_negative("noise", noise), as_not_negative("floor", floor)
     found = ExpectedNoise(level, constant, as_positive("averages", averages))
     if not found.level + found.floor:
-        raise ValueError("noise and floor are both zero: without noise every test finds everything")
+        raise ValueError("noise and floor are both zero; give one of them")
     return found
 
 

@@ -137,15 +137,15 @@ def plan_joint_frfs(
     lines = as_square("gamma", gamma)
     freq, n = as_frequency(freq_hz, len(lines)), len(joint.dofs)
     if not freq.size or freq.min() <= 0:
-        raise ValueError("freq_hz must hold lines above 0 Hz")
+        raise ValueError("freq_hz has no lines or a line at or below 0 Hz; give lines above 0 Hz")
     if lines.shape[1] != 2 * n:
-        raise ValueError(f"gamma must have {2 * n} x {2 * n} FRFs for {n} joint DOFs, not shape {lines.shape}")
+        raise ValueError(f"gamma has shape {lines.shape}; give {2 * n} x {2 * n} FRFs for {n} joint DOFs")
     matrices = {"k": joint.stiffness, "c": joint.damping, "h": joint.hysteretic_stiffness}
     if any((one - np.diag(np.diagonal(one))).any() for one in matrices.values()):
-        raise ValueError("a plan of FRFs between joint DOFs takes a joint without cross terms")
+        raise ValueError("the joint has cross terms; give a joint without them")
     variance = expected_noise(noise, floor, averages).variance(2 * np.pi * freq, lines)
     if not variance.all():
-        raise ValueError("an FRF is zero on a line, and has no noise there: give floor")
+        raise ValueError("an FRF is zero on a line and has no noise there; give floor")
     kinds = ["k", *(kind for kind in "ch" if matrices[kind].any())]
     expected = {
         parameter_name(kind, dof, dof): float(matrices[kind][i, i])

@@ -27,7 +27,7 @@ from jointfrf.kernel.arguments import (
 from jointfrf.messages.finding import Finding, WithFindings
 from jointfrf.planning.design import Criterion, Design, Designer, Prices, criterion_of
 from jointfrf.planning.information import FrfInformation, PlannedTest, expected_noise, narrowest_band
-from jointfrf.spelling import did_you_mean
+from jointfrf.spelling import did_you_mean, some_of
 
 __all__ = ["Addition", "MeasurementPlan", "PlanStep", "plan"]
 
@@ -265,12 +265,12 @@ def plan(
     check_type("assembly", assembly, Assembly)
     freq = as_frequency(freq_hz)
     if not freq.size or freq.min() <= 0:
-        raise ValueError("freq_hz must hold lines above 0 Hz")
+        raise ValueError("freq_hz has no lines or a line at or below 0 Hz; give lines above 0 Hz")
     for name, gains in (("response_gains", response_gains), ("force_gains", force_gains)):
         if not isinstance(gains, Mapping | None):
-            raise TypeError(f"{name} must be a mapping of channels to Unknown, not {type(gains).__name__}")
+            raise TypeError(f"{name} is {type(gains).__name__}; give a mapping of channels to Unknown")
     if criterion not in get_args(Criterion):
-        raise ValueError(f"criterion must be A or D, not {one_line(criterion)}")
+        raise ValueError(f"unknown criterion {one_line(criterion)}; use A or D")
     stays = as_names("sensors", sensors), as_names("hits", hits)
     named = [
         tuple(dict.fromkeys([*own, *as_names(what, more)]))
@@ -303,17 +303,17 @@ def _targets(vector: ParameterVector, names: tuple[str, ...] | None) -> NDArray[
     fitted = [one.name for one in vector.fitted]
     chosen = names or tuple(one.name for one in vector.fitted if one.origin == "joint")
     if not chosen:
-        raise ValueError("there is nothing to find: all parameters of the joint are fixed")
+        raise ValueError("all parameters of the joint are fixed; leave one free")
     open_means = [one.name for one in vector.all if one.origin == "mean" and not one.is_free]
     for name in chosen:
         if name in open_means:
-            raise ValueError(
-                f"{name} is the mean of joints whose spread is not known: a plan for it needs their `spread`"
-            )
+            raise ValueError(f"{name} is the mean of joints with unknown spread; give their `spread`")
         if name not in fitted:
-            raise ValueError(f"no unknown is called {one_line(name)}{did_you_mean(name, fitted)}")
+            raise ValueError(
+                f"unknown target {one_line(name)}; use one of {some_of(list(fitted), 12)}{did_you_mean(name, fitted)}"
+            )
         if vector.fitted[fitted.index(name)].value == 0:
-            raise ValueError(f"{name} is 0 in the assembly: a plan needs the value that is expected, or name targets")
+            raise ValueError(f"{name} is 0 in the assembly; give its expected value, or other targets")
     return np.array([fitted.index(name) for name in dict.fromkeys(chosen)], np.intp)
 
 

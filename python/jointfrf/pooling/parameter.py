@@ -200,12 +200,14 @@ def _random_effects(
     columns = [np.ones(at.size)]
     for name, numbers in plan.trends.items():
         if is_log and (numbers[at] <= 0).any():
-            raise ValueError(f"the trend over {one_line(name)} is a power law: its numbers must be above zero")
+            raise ValueError(f"the trend over {one_line(name)} is a power law; give numbers above zero")
         shown = np.log(numbers[at]) if is_log else numbers[at]
         columns.append(shown - shown.mean())
     design = np.column_stack(columns)
     if np.linalg.matrix_rank(design) < len(columns) or len(columns) >= at.size:
-        raise ValueError(f"{at.size} fits cannot determine a mean and {len(columns) - 1} trends")
+        raise ValueError(
+            f"{at.size} fits cannot determine a mean and {len(columns) - 1} trends; give more fits or fewer trends"
+        )
     names, factors = list[str](), list[NDArray[np.intp]]()
     for name, codes in plan.groups.items():
         group = np.unique(codes[at], return_inverse=True)[1].astype(np.intp)
@@ -268,6 +270,11 @@ def _outlying(effects: RandomEffects, names: Sequence[str], labels: Sequence[str
 def shown_chance(p_value: float) -> str:
     """Return a probability as it is printed."""
     return f"{p_value:.2g}" if p_value >= 1e-4 else "< 1e-4"
+
+
+def _p_value(p_value: float) -> str:
+    shown = shown_chance(p_value)
+    return shown if shown.startswith("<") else f"= {shown}"
 
 
 def _findings(pooled: PooledParameter) -> list[Finding]:

@@ -13,7 +13,7 @@ from jointfrf.identification.result import Fit, columns_of
 from jointfrf.kernel.arguments import FloatArray, as_names, as_number, as_probability, check_type, one_line
 from jointfrf.messages.finding import Finding, WithFindings, worst_first
 from jointfrf.pooling.parameter import ASSEMBLY, Estimate, PooledParameter, TestPlan, pooled_parameter, shown_chance
-from jointfrf.spelling import did_you_mean
+from jointfrf.spelling import did_you_mean, some_of
 
 __all__ = ["PooledFits", "pool"]
 
@@ -144,7 +144,9 @@ def pool(
     units = {name: own[0] for found in each for name, own in found.items()}
     for name in chosen or ():
         if name not in units:
-            raise ValueError(f"no fit has a parameter {one_line(name)}{did_you_mean(name, units)}")
+            raise ValueError(
+                f"unknown parameter {one_line(name)}; use one of {some_of(list(units), 12)}{did_you_mean(name, units)}"
+            )
     pooled, findings = dict[str, PooledParameter](), list[Finding]()
     for name in units if chosen is None else dict.fromkeys(chosen):
         found = [own[name][1] if name in own else None for own in each]
@@ -166,12 +168,12 @@ def _estimates(fit: Fit) -> dict[str, tuple[str, Estimate]]:
 def as_fits(what: str, fits: object) -> list[Fit]:
     """Return fits, at least two, as a list; refuse what is none."""
     if not isinstance(fits, Iterable) or isinstance(fits, str):
-        raise TypeError(f"fits must be a sequence of Fit, not {one_line(fits)}")
+        raise TypeError(f"fits is {one_line(fits)}; give a sequence of Fit")
     listed = list(fits)
     for fit in listed:
         check_type("fits", fit, Fit)
     if len(listed) < 2:
-        raise ValueError(f"{what} needs at least two fits, not {len(listed)}")
+        raise ValueError(f"{len(listed)} fits are too few for {what}; give at least two")
     return listed
 
 
@@ -179,7 +181,7 @@ def as_labels(labels: object, count: int) -> tuple[str, ...]:
     """Return a different name for each fit; "1", "2", ... by default."""
     names = tuple(map(str, range(1, count + 1))) if labels is None else as_names("labels", labels)
     if len(set(names)) != count or len(names) != count:
-        raise ValueError(f"labels must be {count} different names, one for each fit")
+        raise ValueError(f"wrong labels; give {count} different names, one for each fit")
     return names
 
 
@@ -197,13 +199,13 @@ def _plan(
     by_factor = common if isinstance(common, Mapping) else {}
     for name in (*trends, *by_factor):
         if name not in factors:
-            raise ValueError(f"there is no factor {one_line(name)}{did_you_mean(name, factors)}")
+            raise ValueError(f"unknown factor {one_line(name)}; add it to the factors{did_you_mean(name, factors)}")
     codes = {name: _codes(name, own, count) for name, own in factors.items()}
     shared = [(codes[name], as_number("common", own)) for name, own in by_factor.items()]
     if not isinstance(common, Mapping):
         shared.append((np.zeros(count, dtype=np.intp), as_number("common", common)))
     if any(not 0 <= own < math.inf for _, own in shared):
-        raise ValueError("common must be a relative standard error, zero or more")
+        raise ValueError("common is negative or not finite; give a relative standard error of zero or more")
     numbers = {name: _numbers(name, factors[name]) for name in trends}
     groups = _random_factors({name: own for name, own in codes.items() if name not in trends}, count)
     return TestPlan(labels, groups, numbers, shared, probability)
@@ -212,12 +214,12 @@ def _plan(
 def _codes(name: str, own: Sequence[str | float], count: int) -> NDArray[np.intp]:
     """Return the number of the group of each fit."""
     if not isinstance(own, Sequence | np.ndarray) or isinstance(own, str):
-        raise TypeError(f"factor {one_line(name)} must be a sequence of groups, not {one_line(own)}")
+        raise TypeError(f"factor {one_line(name)} is {one_line(own)}; give a sequence of groups")
     if len(own) != count:
-        raise ValueError(f"factor {one_line(name)} has {len(own)} groups for {count} fits")
+        raise ValueError(f"factor {one_line(name)} has {len(own)} groups; give {count}, one for each fit")
     found: NDArray[np.intp] = np.unique([str(one) for one in own], return_inverse=True)[1]
     if found.max() == 0:
-        raise ValueError(f"factor {one_line(name)} is the same for all fits: leave it out")
+        raise ValueError(f"factor {one_line(name)} is the same for all fits; leave it out")
     return found
 
 
@@ -225,9 +227,11 @@ def _numbers(name: str, own: Sequence[str | float]) -> FloatArray:
     try:
         found = np.array([float(one) for one in own])
     except (TypeError, ValueError):
-        raise ValueError(f"the trend over {one_line(name)} needs numbers, as 12.5") from None
+        raise ValueError(
+            f"the trend over {one_line(name)} has groups that are no numbers; give numbers such as 12.5"
+        ) from None
     if not np.isfinite(found).all():
-        raise ValueError(f"the trend over {one_line(name)} needs finite numbers")
+        raise ValueError(f"the trend over {one_line(name)} has infinite numbers or NaN; give finite numbers")
     return found
 
 
@@ -237,13 +241,15 @@ def _random_factors(codes: Mapping[str, NDArray[np.intp]], count: int) -> dict[s
     for name, own in codes.items():
         if own.max() + 1 == count and name != ASSEMBLY:
             raise ValueError(
-                f"factor {one_line(name)} has another group for each fit: it cannot be distinguished from the scatter "
-                "between assemblies; as a number it may be a trend"
+                f"factor {one_line(name)} has a different group for each fit, as the assemblies do; leave it out, or "
+                "make it a trend"
             )
         first: dict[int, int] = {}
         pattern = tuple(first.setdefault(code, len(first)) for code in own.tolist())
         if pattern in seen:
-            raise ValueError(f"factors {one_line(seen[pattern])} and {one_line(name)} have the same groups: name one")
+            raise ValueError(
+                f"factors {one_line(seen[pattern])} and {one_line(name)} have the same groups; leave out one"
+            )
         seen[pattern] = name
     kept = {name: own for name, own in codes.items() if own.max() + 1 < count}
     return dict(sorted(kept.items(), key=lambda item: -int(item[1].max())))

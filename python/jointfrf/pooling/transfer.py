@@ -131,7 +131,7 @@ def transfer(
     given = spread if isinstance(spread, Mapping) else dict.fromkeys(names, spread)
     own = {name: as_number("spread", one) for name, one in given.items()}
     if any(not 0 <= one < np.inf for one in own.values()):
-        raise ValueError("spread must be a relative standard deviation, zero or more")
+        raise ValueError("spread is negative or not finite; give a relative standard deviation of zero or more")
     more = np.diag([own.get(name, 0.0) ** 2 for name in names])
     values, covariances = zip(*(_logarithms(fit, names) for fit in listed), strict=True)
     return _compared(shown, names, np.array(values), np.array(covariances) + more)
@@ -147,11 +147,11 @@ def _names(fits: Sequence[Fit], parameters: Sequence[str] | None) -> tuple[str, 
     for name in parameters or ():
         if name not in shared:
             raise ValueError(
-                f"not every fit has {one_line(name)} with an interval above zero{did_you_mean(name, shared)}"
+                f"some fit has no {one_line(name)} with an interval above zero; use another{did_you_mean(name, shared)}"
             )
     chosen = tuple(shared if parameters is None else dict.fromkeys(parameters))
     if not chosen:
-        raise ValueError("the fits have no parameter of the joint in common that is above zero and has an interval")
+        raise ValueError("the fits share no joint parameter with an interval above zero; use other fits")
     return chosen
 
 

@@ -33,9 +33,9 @@ def read_toml(path: Path) -> TomlTable:
     try:
         return TomlTable(tomllib.loads(path.read_text(encoding="utf-8")), str(path), path.parent)
     except OSError as error:
-        raise FileContentError(f"{path}: cannot be read: {error.strerror}") from error
+        raise FileContentError(f"{path} cannot be read: {error.strerror}; check the file") from error
     except (ValueError, RecursionError) as error:
-        raise FileContentError(f"{path}: not a TOML file: {error}") from error
+        raise FileContentError(f"{path}: not a TOML file: {error}; correct it") from error
 
 
 def missing_in_words(names: Sequence[str]) -> str:
@@ -66,7 +66,7 @@ class TomlTable:
         """Return the exception that says which keys there are instead of an unknown one."""
         similar = look_alike(key, names)
         hint = f"; did you mean {similar!r}?" if similar else ""
-        return FileContentError(f"{self.where}: unknown key {key!r}; it takes {', '.join(names)}{hint}")
+        return FileContentError(f"{self.where}: unknown key {key!r}; use one of {', '.join(names)}{hint}")
 
     def missing(self, names: Sequence[str], why: str = "") -> FileContentError:
         """Return the exception that says that keys are missing, and what needs them."""
@@ -98,7 +98,7 @@ class TomlTable:
             return builder()
         except (ValueError, TypeError, OSError, ArithmeticError) as error:
             where = f"{self.where}: {key}" if key else self.where
-            why = "a number is too large or too small" if isinstance(error, ArithmeticError) else error
+            why = "a number is too large or too small; correct it" if isinstance(error, ArithmeticError) else error
             raise FileContentError(f"{where}: {why}") from error
 
     def file(self, key: str) -> Path:
@@ -113,7 +113,7 @@ class TomlTable:
             why = "is a folder" if path.is_dir() else "does not exist"
         except OSError as error:
             why = f"cannot be found: {error.strerror}"
-        raise FileContentError(f"{self.where}: {key} must name a file: {path} {why}")
+        raise FileContentError(f"{self.where}: {key}: {path} {why}; name a file")
 
     def table(self, key: str) -> TomlTable:
         """Return a table inside this one."""

@@ -208,7 +208,7 @@ def test_a_template_runs_as_it_stands(kind, tmp_path, capsys, monkeypatch, witho
         assert main(["run", "own", "--jobs", "1", "--realisations", "2"]) == 0
     capsys.readouterr()
     assert main(["new", kind, "own"]) == 2
-    assert "own/case.toml exists: name another folder" in capsys.readouterr().err
+    assert "own/case.toml exists; name another folder" in capsys.readouterr().err
     assert (tmp_path / "own" / "case.toml").read_text() == text
 
 

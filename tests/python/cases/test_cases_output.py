@@ -283,7 +283,7 @@ def test_results_that_cannot_be_written_are_one_sentence(tmp_path, capsys):
     out = tmp_path / "file" / "out"
     assert main(["run", "3.1", "--realisations", "2", "--jobs", "1", "--out", str(out)]) == 2
     # Before the work, and the file that is in the way.
-    assert capsys.readouterr().err == f"jointfrf: error: --out: {out.parent} is a file, not a folder\n"
+    assert capsys.readouterr().err == f"jointfrf: error: --out: {out.parent} is a file; name a folder\n"
 
 
 def test_two_cases_of_one_name_are_refused(tmp_path, capsys):

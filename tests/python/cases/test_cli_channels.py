@@ -164,17 +164,17 @@ def test_a_table_of_channels_stands_for_the_coordinates_of_the_file(test_file, t
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--at", "1,2"], "'1,2' is not like x,y,z in m"),
+        (["--at", "1,2"], "'1,2' is no point; use the form x,y,z in m"),
         (["--at", AT, "--j", "101:104"], "--k and --dofs are missing"),
-        (["--at-k", AT, *JOINT_WORDS[2:]], "--at-k needs --at X,Y,Z"),
+        (["--at-k", AT, *JOINT_WORDS[2:]], "--at-k needs a reference point"),
         ([*JOINT_WORDS, "--spacing", "0.1", "--axis", "x"], "--spacing is for nodes along a line"),
-        ([*JOINT_WORDS, "--export", "calculix:1,2"], "calculix has rotations at ROT NODEs of rigid bodies only"),
-        ([*JOINT_WORDS, "--export", "ansys:1,2"], "use --damping viscous, or --no-damping"),
+        ([*JOINT_WORDS, "--export", "calculix:1,2"], "rotations of calculix need the ROT NODEs of both rigid bodies"),
+        ([*JOINT_WORDS, "--export", "ansys:1,2"], "use --damping viscous or --no-damping"),
         ([*JOINT_WORDS, "--export", "nastrn:1,2"], "did you mean nastran?"),
         ([*JOINT_WORDS, "--output", "a.bdf"], "--output is for cards; add --export PROGRAM:J,K"),
-        ([*JOINT_WORDS, "--export", "nastran:1,2", "--output", "no/a.bdf"], "--output: there is no folder no"),
-        ([*JOINT_WORDS, "--save", "no/joint.json"], "--save: there is no folder no"),
-        ([*JOINT_WORDS, "--save", "."], "--save: . is a folder, not a file"),
+        ([*JOINT_WORDS, "--export", "nastran:1,2", "--output", "no/a.bdf"], "--output: folder no does not exist"),
+        ([*JOINT_WORDS, "--save", "no/joint.json"], "--save: folder no does not exist"),
+        ([*JOINT_WORDS, "--save", "."], "--save: . is a folder; name a file"),
     ],
 )
 def test_wrong_usage(test_file, words, message):
@@ -190,11 +190,11 @@ def test_words_and_files_that_do_not_fit(test_file, tmp_path):
         assert result.returncode == 1, result.stderr
         return result.stderr
 
-    assert "nodes 301 to 399; it has nodes 101 to 104, 111 to 122" in said(
+    assert "nodes 301 to 399; use nodes of 101 to 104, 111 to 122" in said(
         *JOINT_WORDS[:3], "301:399", *JOINT_WORDS[4:]
     )
     assert "has no FRF at node 105" in said(*JOINT_WORDS[:3], "101:104,105", *JOINT_WORDS[4:])
     assert "do not lie on one line" in said(*JOINT_WORDS[2:])
-    assert "say --at X,Y,Z for virtual points" in said(*JOINT_WORDS[2:])
+    assert "add --at X,Y,Z for virtual points" in said(*JOINT_WORDS[2:])
     (tmp_path / "c.toml").write_text('[[channel]]\nchannel = "999:+x"\nside = "j"\n')
     assert "c.toml: [[channel]] number 1: " in said("--channels", tmp_path / "c.toml", "--at", AT, "--dofs", "x")

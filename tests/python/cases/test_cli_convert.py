@@ -70,15 +70,12 @@ def test_several_files_become_one(tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ([BARS], "name the files to read, and last the one to write"),
-        (
-            [BARS, "out.xlsx"],
-            "out.xlsx has no suffix of a format that is written; use one of .uff, .unv, .npz, .h5, .hdf5, .csv",
-        ),
-        ([BARS, "nowhere/out.npz"], "there is no folder nowhere"),
-        ([BARS, BARS], "two_bars.uff is one of the files to read"),
-        ([BARS, "a.npz", "--map", "H=A"], "'H=A' is not FIELD=NAME with a field out of freq_hz, h"),
-        ([BARS, "a.npz", "--band", "high"], "'high' is not a band like 200:550"),
+        ([BARS], "the file to write is missing"),
+        ([BARS, "out.xlsx"], "out.xlsx has no suffix of a format that is written: .uff, .unv, .npz, .h5, .hdf5, .csv"),
+        ([BARS, "nowhere/out.npz"], "folder nowhere does not exist"),
+        ([BARS, BARS], "two_bars.uff is also a file to read"),
+        ([BARS, "a.npz", "--map", "H=A"], "'H=A' is not FIELD=NAME; use a field of freq_hz, h"),
+        ([BARS, "a.npz", "--band", "high"], "'high' is no band; use the form 200:550"),
     ],
 )
 def test_wrong_usage(tmp_path, monkeypatch, words, message):

@@ -164,8 +164,8 @@ def test_the_report_is_written_where_it_is_asked_for(tmp_path):
         assert said in text, said
     assert [path.name for path in page.parent.iterdir()] == ["customer.html"]
     result = run(BARS, *JOINT_OF_BARS, "--method", "inverse-substructuring", "--report", page, expect=2)
-    assert "--report is of method compliance" in result.stderr
-    assert "--space is of --report" in run(BARS, *JOINT_OF_BARS, "--space", expect=2).stderr
+    assert "--report needs method compliance" in result.stderr
+    assert "--space needs a page" in run(BARS, *JOINT_OF_BARS, "--space", expect=2).stderr
     assert "data-content" not in text
     pytest.importorskip("plotly")
     run(BARS, *JOINT_OF_BARS, "--report", page, "--space")
@@ -191,8 +191,8 @@ def test_what_is_missing_is_said_in_one_sentence(words, message, capsys):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--j", "101", "--k", "201,202", "--dofs", "y"], "same number of nodes"),
-        ([*JOINT_OF_BARS, "--spacing", "0.01"], "--spacing and --axis go together"),
+        (["--j", "101", "--k", "201,202", "--dofs", "y"], "give equal numbers"),
+        ([*JOINT_OF_BARS, "--spacing", "0.01"], "only one of --spacing and --axis is given"),
         ([*JOINT_OF_BARS[:-1], "phi"], "dofs must be among x, y, z, theta_x, theta_y, theta_z, not 'phi'"),
         ([*JOINT_OF_BARS[:-1], "theta_w"], "did you mean theta_"),
     ],

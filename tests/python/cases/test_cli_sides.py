@@ -58,8 +58,8 @@ def test_the_nearest_node_of_a_coarse_part_is_said(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"elements": "3", "joint": '["4:y", "4:theta"]'}, "no node is at channel 101:+y, x, y, z = -20, 0, 0 mm"),
-        ({"joint": '["31:y"]'}, "must name the 2 DOFs of the joint, not 1"),
+        ({"elements": "3", "joint": '["4:y", "4:theta"]'}, "no node is at channel 101:+y, (-20, 0, 0) mm"),
+        ({"joint": '["31:y"]'}, "1 DOFs; name the 2 DOFs of the joint"),
         ({"joint": '["31:y", "99:theta"]'}, "99:theta"),
         ({"unknown": "{ weight = 0.1 }"}, "weight"),
     ],
@@ -73,6 +73,6 @@ def test_a_part_that_does_not_fit_is_one_sentence(tmp_path, changes, message):
 
 def test_one_side_alone_or_another_method_is_refused():
     words = (CASE / "test.uff", *JOINT, "--side-j", CASE / "side_j.toml")
-    assert "--side-j and --side-k go together" in run(*words, expect=2).stderr
+    assert "give both --side-j and --side-k" in run(*words, expect=2).stderr
     words += ("--side-k", CASE / "side_k.toml", "--method", "inverse-substructuring")
-    assert "of method compliance" in run(*words, expect=2).stderr
+    assert "need method compliance" in run(*words, expect=2).stderr

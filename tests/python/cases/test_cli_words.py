@@ -9,10 +9,11 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
+import warnings
 import weakref
 from functools import partial
-from itertools import chain, repeat
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +21,10 @@ import pytest
 
 from command import run_command
 from jointfrf.__main__ import main as started
+from jointfrf.cli import usage
 from jointfrf.cli.main import main
 from jointfrf.cli.parser import COMMANDS, command_parser
+from jointfrf.errors import FrfCheckWarning
 from thinned_cases import DrawSome
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -38,22 +41,22 @@ def _elsewhere(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["identfy"], "there is no command 'identfy'; did you mean identify?"),
-        (["nothing"], "there is no command 'nothing': jointfrf --help lists them"),
+        (["identfy"], "unknown command 'identfy'; did you mean identify?"),
+        (["nothing"], "unknown command 'nothing'; see jointfrf --help"),
         (["identify", "a.uff", "--dof", "y"], "unknown option --dof; did you mean --dofs?"),
         (["identify", "a.uff", "--qiet"], "unknown option --qiet; did you mean --quiet?"),
-        (["identify", "a.uff", "--damping=viscos"], "'viscos' is none of none, viscous, hysteretic, both, auto"),
+        (["identify", "a.uff", "--damping=viscos"], "unknown value 'viscos'; use one of none, viscous"),
         (["identify", "a.uff", "--damping", "viscos"], "did you mean viscous?"),
         (["identify", "a.uff", "--method", "complience"], "did you mean compliance?"),
         (["check", "a.uff", "--dofs", "thetax,tz"], "not 'tz'"),
         (["check", "a.uff", "--dofs", "theta_q"], "did you mean theta_"),
         (["check", "a.uff", "--j", "5:3"], "'5:3' is no node number or range"),
-        (["check", "a.uff", "--j", "1:9999999"], "are more than 100000 nodes"),
-        (["check", "a.uff", "--config", "no.toml"], "--config: there is no file no.toml"),
-        (["check", "a.uff", "--force-quantity"], "--force-quantity needs --quantity"),
+        (["check", "a.uff", "--j", "1:9999999"], "are too many nodes; name at most 100000"),
+        (["check", "a.uff", "--config", "no.toml"], "--config: file no.toml does not exist"),
+        (["check", "a.uff", "--force-quantity"], "--force-quantity without a quantity"),
         (["completion", "bsh"], "did you mean bash?"),
         (["cases", "--key"], "did you mean --keys?"),
-        ([], "identify a joint from a file of measured FRFs"),
+        ([], "identify a joint from measured FRFs"),
         (["--hlep"], "unknown option --hlep; did you mean --help?"),
     ],
 )
@@ -134,7 +137,7 @@ def test_quiet_prints_warnings(monkeypatch):
             "--damping and --cross have no effect",
         ),
         (["--at", "0.5,0,0", "--bending-stiffness", "1"], "--bending-stiffness has no effect: no rotation is found"),
-        (["--element", "7"], "--element has no effect: it is for cards"),
+        (["--element", "7"], "--element has no effect: no cards are written"),
     ],
 )
 def test_options_without_effect_are_named(words, warning):
@@ -192,8 +195,8 @@ def _structures(structures, tmp_path):
         (["decouple", *PARTS, "c.npz", "--equation", "rr", "--j", "3", "--k", "1", "--dofs", "x", "--r", "2:x", "--s",
           "2:x", "--renumber-b", "100"], "--s has no effect: equation rr does not use it"),
         (["pool", "fit.json", "again.json", "--transfer", "--output", "p.csv", "--trend", "m"],
-         "--trend and --output have no effect: it is of the pool"),
-        (["identify", BARS, *JOINT, "--save-lines"], "--save-lines has no effect: it is for --save"),
+         "--trend and --output have no effect: --transfer only tests"),
+        (["identify", BARS, *JOINT, "--save-lines"], "--save-lines has no effect: nothing is saved without --save"),
         (["export", "joint.toml", "abaqus:1,2", "--frequency", "5"], "--frequency has no effect: no law"),
     ],
 )  # fmt: skip
@@ -207,41 +210,137 @@ def test_every_command_names_options_without_effect_also_in_json(words, warning)
     assert f"jointfrf: warning: {warning}" in run_command(*words, "--quiet").stderr
 
 
-@pytest.mark.usefixtures("_structures")
-def test_several_tests_of_models_say_the_time_left_and_their_warnings(monkeypatch, tmp_path):
-    from jointfrf.cli import identify_model
-
-    said = []
-    monkeypatch.setattr(identify_model, "waiting", lambda text: said.append(text) or contextlib.nullcontext())
-    monkeypatch.setattr(identify_model.time, "monotonic", chain([0.0, 0.0, 100.0], repeat(0.0)).__next__)
+@pytest.fixture
+def _models(_structures, tmp_path):
+    """The same with models of the chains, one of them wrong, and four tests, the third of them damaged."""
     wrong = CHAIN.replace("[2.0, 1.0, 3.0]", "[2.0, 1.1, 3.0]")  # which the residual shows
     (tmp_path / "assembly.toml").write_text(
         f'[A]\n{wrong.format(ground="start")}joint = ["3:x"]\nexact = true\n[B]\n{CHAIN.format(ground="end")}'
         'joint = ["1:x"]\nexact = true\n[joint]\ndofs = ["x"]\nstiffness = [9e4]\ndamping = [9.0]\n'
         '[channels]\n"2:+x" = "A/2:x"\n"102:+x" = "B/2:x"\n'
     )
-    assert run_command("convert", "c.npz", "d.npz").returncode == 0
-    words = ["identify", "c.npz", "d.npz", "--model", "assembly.toml", "--noise", "0.001", "--json"]
-    result = run_command(*words, "--each")
-    assert result.returncode == 0, result.stderr
-    content = json.loads(result.stdout)
+    for name in ("d", "e", "f"):
+        assert run_command("convert", "c.npz", f"{name}.npz").returncode == 0
+    (tmp_path / "e.npz").write_bytes((tmp_path / "e.npz").read_bytes()[:200])
+
+
+EACH = ["identify", "c.npz", "d.npz", "e.npz", "f.npz", "--model", "assembly.toml", "--noise", "0.001", "--each"]
+
+
+@pytest.mark.usefixtures("_models")
+def test_a_test_that_fails_ends_no_other_one():
+    result = run_command(*EACH, "--save", "fit.json")
+    assert result.returncode == 1
+    shown = [line for line in result.stdout.splitlines() if " of 4): " in line]
+    assert [line.partition(":")[0] for line in shown] == [f"{one} ({i} of 4)" for i, one in enumerate("cdef", 1)]
+    assert shown[0].partition(": ")[2].startswith("k_x ")
+    assert shown[2] == "e (3 of 4): failed"
+    last = result.stderr.splitlines()[-1]
+    assert last.startswith("jointfrf: error: e.npz")
+    assert last.count("e.npz") == 1
+    assert all(Path(f"fit_{one}.json").exists() == (one != "e") for one in "cdef")
+    content = json.loads(run_command(*EACH, "--json").stdout)
     own = [test["fits"][0]["warnings"] for test in content["tests"]]
     assert own[0]
-    named = [f"{name}: {text}" for name, texts in zip("cd", own, strict=True) for text in texts]
+    named = [f"{name}: {text}" for name, texts in zip("cdf", own, strict=True) for text in texts]
     assert [text for text in content["warnings"] if text in named] == named
-    assert said == ["fit of c.npz (1 of 2)", "fit of d.npz (2 of 2, about 2 min left)"]
-    alone = json.loads(run_command(*[word for word in words if word != "d.npz"]).stdout)
+    assert list(content["failed"]) == ["e.npz"]
+    alone = json.loads(run_command(*EACH[:2], *EACH[5:-1], "--json").stdout)
     assert set(own[0]) <= set(alone["warnings"])
+
+
+@pytest.mark.usefixtures("_models")
+@pytest.mark.parametrize("wrong", [AssertionError("no"), IndexError("no"), np.linalg.LinAlgError("no")])
+def test_any_error_of_a_test_is_named_at_the_end(monkeypatch, wrong):
+    from jointfrf.cli import identify_model
+
+    fit = identify_model._one
+    one = lambda args, out: fit(args, out) if args.files[0].name != "d.npz" else (_ for _ in ()).throw(wrong)  # noqa: E731
+    monkeypatch.setattr(identify_model, "_one", one)
+    result = run_command(*EACH[:3], *EACH[5:])
+    assert result.returncode == 1
+    name = "" if isinstance(wrong, ValueError) else f"{type(wrong).__name__}: "
+    assert result.stderr.splitlines()[-1] == f"jointfrf: error: d.npz: {name}no"
+    assert "c (1 of 2): k_x" in result.stdout
+
+
+@pytest.mark.usefixtures("_models")
+def test_an_interrupt_leaves_the_tests_that_are_finished(monkeypatch):
+    from jointfrf.cli import identify_model
+
+    fit = identify_model._one
+
+    def until_d(args, out):
+        if args.files[0].name == "d.npz":
+            raise KeyboardInterrupt
+        return fit(args, out)
+
+    monkeypatch.setattr(identify_model, "_one", until_d)
+    result = run_command(*EACH, "--out", "o")
+    assert (result.returncode, result.stderr.splitlines()[-1]) == (130, "jointfrf: error: interrupted")
+    assert Path("o/parameters.csv").read_text().splitlines()[1].startswith("c,k_x,")
+    assert "wrote o/parameters.csv" in result.stdout
+    result = run_command(*EACH[:1], "d.npz", *EACH[5:])  # nothing is finished
+    assert result == (130, "", "jointfrf: error: interrupted\n")
+
+
+def test_an_interrupt_leaves_the_methods_that_are_finished(monkeypatch):
+    from jointfrf.cli import identify as command
+
+    fit = command._fit
+
+    def compliance_only(args, method, *rest):
+        if method != "compliance":
+            raise KeyboardInterrupt
+        return fit(args, method, *rest)
+
+    monkeypatch.setattr(command, "_fit", compliance_only)
+    words = ["identify", BARS, *JOINT, "--save", "fit.json", "--report", "fit.html"]
+    result = run_command(*words, "--method", "compliance,inverse-substructuring")
+    assert (result.returncode, result.stderr.splitlines()[-1]) == (130, "jointfrf: error: interrupted")
+    assert result.stdout.splitlines()[-2:] == ["wrote fit.json", "wrote fit.html"]
+    result = run_command(*words[:1], BARS, *JOINT, "--save", "other.json", "--method", "inverse-substructuring")
+    assert (result.returncode, Path("other.json").exists()) == (130, False)
+
+
+@pytest.mark.usefixtures("_models")
+def test_levels_and_pool_name_files_that_fail(monkeypatch):
+    from jointfrf.cli import levels as command
+
+    words = ["levels", *EACH[1:5], "--level", "1,2,3,4", "--model", "assembly.toml", "--noise", "0.001"]
+    result = run_command(*words)
+    assert result.returncode == 1
+    assert result.stderr.splitlines()[-1].startswith("jointfrf: error: e.npz")
+    assert all(f"\n{one} " in result.stdout for one in "cdf")
+    assert "\ne " not in result.stdout
+    result = run_command(words[0], "e.npz", "--level", "1", *words[7:])
+    assert (result.returncode, result.stdout) == (1, "")
+    assert "e.npz" in result.stderr
+    fit, done = command._fit, []
+    monkeypatch.setattr(command, "_fit", lambda *own: fit(*own) if not done.append(own) and len(done) < 3 else 1 / 0)
+    assert "f.npz: division by zero" in run_command(*words).stderr
+    for name in ("third.json", "fourth.json"):
+        shutil.copy("fit.json", name)
+    Path("again.json").write_text("{")
+    result = run_command("pool", "fit.json", "again.json", "third.json", "fourth.json", "--factor", "day=1,1,2,2")
+    assert result.returncode == 1
+    assert result.stderr.splitlines()[-1].startswith("jointfrf: error: again.json ")
+    assert "k_y" in result.stdout
+    result = run_command("pool", "fit.json", "again.json")
+    assert (result.returncode, result.stdout) == (1, "")
+    assert "again.json is no file of a joint" in result.stderr
+    result = run_command("pool", "fit.json", "third.json", "--factor", "day=1,1,2")
+    assert "--factor day has 3 groups; give 2, one for each file" in result.stderr
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--model", "m.toml", "--window-decay", "3"], "--window-decay are of fits without models"),
-        (["--out", "fit.txt"], "--out: fit.txt is a file, not a folder"),
-        (["--out", "fit.txt/deep"], "--out: fit.txt is a file, not a folder"),
-        (["--report", "."], "--report: . is a folder, not a file"),
-        (["--report", "fit.txt/page.html"], "--report: fit.txt is a file, not a folder"),
+        (["--model", "m.toml", "--window-decay", "3"], "--window-decay are for fits without models"),
+        (["--out", "fit.txt"], "--out: fit.txt is a file; name a folder"),
+        (["--out", "fit.txt/deep"], "--out: fit.txt is a file; name a folder"),
+        (["--report", "."], "--report: . is a folder; name a file"),
+        (["--report", "fit.txt/page.html"], "--report: fit.txt is a file; name a folder"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_done_is_said_before_a_file_is_read(tmp_path, words, message):
@@ -260,7 +359,7 @@ def test_what_cannot_be_done_is_said_before_a_file_is_read(tmp_path, words, mess
         ("jinja2", ["study", "no"]),
         ("pyarrow", ["study", "no", "--values", "parquet"]),
         ("pyarrow", ["study", "merge", "a", "b", "--out", "c", "--values", "parquet"]),
-        ("jinja2", ["plan", "no.toml", "--report", "p.html"]),
+        ("jinja2", ["plan", "no.toml", "--band", "1:2", "--step", "1", "--report", "p.html"]),
         ("jinja2", ["pool", "no.json", "--report", "p.html"]),
         ("h5py", ["convert", "no.uff", "a.h5"]),
         ("h5py", ["frf", "no.toml", "--output", "a.h5"]),
@@ -328,7 +427,19 @@ def test_messages_speak_of_options(tmp_path, fields, words, message):
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no such signal")
 def test_an_interrupted_command_ends_with_one_sentence(tmp_path):
-    words = ["study", "3.1", "--estimator", "ismm", "--realisations", "1000000", "--jobs", "1", "--out", "study"]
+    words = [
+        "study",
+        "3.1",
+        "--estimator",
+        "ismm",
+        "--realisations",
+        "1000000",
+        "--jobs",
+        "1",
+        "--out",
+        "study",
+        "--quiet",
+    ]
     # A shell starts what runs in its background with the signal ignored, and tests hand that on.
     with subprocess.Popen([sys.executable, "-m", "jointfrf", *words], stdout=-1, stderr=-1, text=True,
                           start_new_session=True, preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
@@ -363,7 +474,19 @@ def _workers(children: Path) -> list[str]:
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="children are listed by Linux")
 @pytest.mark.parametrize("delay", [0, *(pytest.param(each, marks=pytest.mark.long) for each in (0.1, 0.2, 0.4, 0.8))])
 def test_an_interrupt_while_processes_start_ends_all_of_them(delay):
-    words = ["study", "3.1", "--estimator", "ismm", "--realisations", "1000000", "--jobs", "2", "--out", "study"]
+    words = [
+        "study",
+        "3.1",
+        "--estimator",
+        "ismm",
+        "--realisations",
+        "1000000",
+        "--jobs",
+        "2",
+        "--out",
+        "study",
+        "--quiet",
+    ]
     with subprocess.Popen([sys.executable, "-m", "jointfrf", *words], stdout=-1, stderr=-1, text=True,
                           start_new_session=True, preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
                           ) as process:  # fmt: skip
@@ -483,11 +606,11 @@ def test_the_command_line_wins(tmp_path):
         ("quantity", "quantitty", "did you mean 'quantity'?"),
         ("[identify]", "[identfy]", "did you mean 'identify'?"),
         ("damping", "dampening", "[identify]: unknown key 'dampening'"),
-        ('"viscous"', '"viscos"', "[identify]: damping: 'viscos' is none of none, viscous"),
+        ('"viscous"', '"viscos"', "[identify]: damping: unknown value 'viscos'; use one of none, viscous"),
         ("[101, 102]", "[0]", "jointfrf.toml: j: '0' is no node number"),
         ('"y", "theta_z"', '"y", "theta_"', "dofs: dofs must be among"),
-        ("[20, 100]", "[20]", "band: '20' is not a band like 200:550"),
-        ('quantity = "accelerance"', "quantity = 2020-01-01", "quantity: must be a text, a number or a list"),
+        ("[20, 100]", "[20]", "band: '20' is no band; use the form 200:550"),
+        ('quantity = "accelerance"', "quantity = 2020-01-01", "is no option value; write a text, a number or a list"),
         ("[identify]", "[identify", "not a TOML file"),
         ("[identify]", "identify = 3\n[run]", "identify must be a table"),
     ],
@@ -520,7 +643,10 @@ def test_a_file_that_is_found_writes_nothing(tmp_path, monkeypatch, said, key):
     (folder / "jointfrf.toml").write_text(f"{PROJECT}{said}\n")
     result = run_command("identify", BARS)
     assert result.returncode == 1
-    assert f"[identify]: {key}: say it on the command line, or name the file by --config" in result.stderr
+    assert (
+        f"[identify]: {key}: not taken from a jointfrf.toml in the working directory; give it on the command line"
+        in result.stderr
+    )
     assert sorted(each.name for each in tmp_path.rglob("*")) == ["jointfrf.toml", "stranger"]
 
 
@@ -529,9 +655,9 @@ def test_a_file_that_is_found_names_no_executor(tmp_path):
     Path("jointfrf.toml").write_text('[study]\nexecutor = "dask:tcp://127.0.0.1:9"\n')
     result = run_command("study", "4.2", "--realisations", "2")
     assert result.returncode == 1
-    assert "[study]: executor: say it on the command line" in result.stderr
+    assert "[study]: executor: not taken from a jointfrf.toml" in result.stderr
     Path("jointfrf.toml").write_text("json = true\n")
-    assert "json: say it on the command line" in run_command("cases").stderr
+    assert "json: not taken from a jointfrf.toml" in run_command("cases").stderr
     Path("jointfrf.toml").write_text('export = "abaqus:1,2"\n')
     assert "export must be a table" in run_command("cases").stderr
 
@@ -547,7 +673,7 @@ def test_a_file_that_is_found_reads_nothing_outside_its_folder(tmp_path, monkeyp
     (folder / "jointfrf.toml").write_text(f'channels = "{name}"\nat = [0, 0, 0]\n')
     result = run_command("check", BARS)
     assert result.returncode == 1
-    assert f"channels: {name} is not in the folder of this file, which was found and not named" in result.stderr
+    assert f"channels: {name} is not in the folder of this file; name the file by --config" in result.stderr
     named = run_command("check", BARS, "--config", "jointfrf.toml")
     assert "is not in the folder" not in named.stderr
 
@@ -555,7 +681,7 @@ def test_a_file_that_is_found_reads_nothing_outside_its_folder(tmp_path, monkeyp
 def test_a_wrong_value_of_a_file_that_is_named():
     Path("own.toml").write_text("quiet = 1\n")
     result = run_command("check", BARS, "--config", "own.toml")
-    assert "quiet: must be true or false, not 1" in result.stderr
+    assert "quiet: 1 is no switch; write true or false" in result.stderr
 
 
 def test_the_limit_of_what_is_read_is_an_option(tmp_path, monkeypatch):
@@ -591,30 +717,100 @@ def test_completion_of_the_shells():
     assert done.stdout.split() == ["--band"], done.stderr
 
 
-def test_time_left_on_a_terminal(monkeypatch, capsys):
-    from jointfrf.cli import usage
+def test_warnings_are_sentences(monkeypatch):
+    def warn(args):
+        warnings.warn("error: sign: 101:+y is reversed; turn it", FrfCheckWarning, stacklevel=1)
+        warnings.warn("warning: gain: 102:+y", UserWarning, stacklevel=1)
+        with np.errstate(all="warn"):
+            assert np.isinf(np.array([1.0]) / 0.0 * np.float64(1e308) * 10).all()  # numpy's own warnings
+        usage.Output(args).give({})
+        return 0
 
-    clock = iter([0.0, 10.0, 20.0, 1000.0, 2000.0])
-    monkeypatch.setattr(usage.time, "monotonic", lambda: next(clock))
-    monkeypatch.setattr(usage.sys.stderr, "isatty", lambda: True, raising=False)
-    show = usage.progress("case")
-    show(1, 4)
-    show(2, 4)
-    show(3, 6)
-    show(1, 6)  # of another thread, later
-    show(4, 4)
-    said = capsys.readouterr().err
-    assert said.count("%") == 3
-    assert "case: 25 %, about 30 s left" in said
-    assert "case: 50 %, about 20 s left" in said
-    assert "about 17 min left" in said
-    assert said.endswith("\r\x1b[K")
+    monkeypatch.setattr("jointfrf.cli.cases.run", warn)
+    result = run_command("cases", "--json")
+    shown = ["sign: 101:+y is reversed; turn it", "gain: 102:+y"]
+    assert json.loads(result.stdout)["warnings"] == shown
+    assert result.stderr == "".join(f"jointfrf: warning: {text}\n" for text in shown)
+
+
+class _Clock:
+    """Time that passes only where a test says so, and waits of the thread that shows progress."""
+
+    def __init__(self, monkeypatch, is_terminal):
+        self.now = 0.0
+        monkeypatch.setattr(usage.time, "monotonic", lambda: self.now)
+        monkeypatch.setattr(usage.sys.stderr, "isatty", lambda: is_terminal, raising=False)
+
+    def text(self, *, bar=False):
+        return usage._progress_text(self.now, bar=bar)
+
+    def lines(self, times):
+        """Show progress at these times, as the thread does."""
+        waits = iter([*times, None])
+
+        class Ended:
+            def wait(this, seconds):  # noqa: N805
+                following = next(waits)
+                self.now = self.now if following is None else following
+                return following is None
+
+        usage._show_progress(Ended())
+
+
+def test_progress_has_stage_time_share_and_time_left(monkeypatch):
+    clock = _Clock(monkeypatch, is_terminal=True)
+    with usage.waiting("identify"), usage.waiting("tests") as count:
+        clock.now = 10.0
+        assert clock.text() == "tests: 10 s"
+        count(1, 4)
+        with usage.waiting("fit of a.uff"):
+            clock.now = 20.0
+            assert clock.text() == "fit of a.uff: 10 s, 25 %, about 20 s left"  # 10 s for each test, 10 s have passed
+        count(2, 4)
+        assert clock.text(bar=True) == "[##########----------] tests: 20 s, 50 %, about 20 s left"
+        count(1, 4)  # of another thread, later
+        assert "50 %" in clock.text()
+        clock.now = 1000.0
+        count(3, 6)
+        assert clock.text() == "tests: 1000 s, 50 %, about 17 min left"
+        count(6, 6)  # all of one part: the next may begin
+        assert clock.text() == "tests: 1000 s"
+    assert not usage._STAGES
+
+
+def test_progress_is_a_line_now_and_then(monkeypatch, capsys):
+    clock = _Clock(monkeypatch, is_terminal=False)
+    with usage.waiting("plan"):
+        clock.lines([1.0, 2.9, 3.0, 8.0, 13.0, 13.5, 23.0])
+    assert capsys.readouterr() == ("", "jointfrf: plan: 3 s\njointfrf: plan: 13 s\njointfrf: plan: 23 s\n")
+
+
+def test_progress_on_a_terminal_gives_way_to_text(monkeypatch, capsys):
+    clock = _Clock(monkeypatch, is_terminal=True)
+    monkeypatch.setenv("COLUMNS", "20")
+    with usage.waiting("a very long name of a stage"):
+        clock.lines([1.0])
+        assert capsys.readouterr().err == "\r\x1b[Ka very long name of"[: 4 + 19]
+        usage.complain("error", "no")
+    assert capsys.readouterr().err == "\r\x1b[Kjointfrf: error: no\n"
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_every_command_that_takes_long_prints_its_stage(monkeypatch, capsys, quiet):
+    monkeypatch.setattr(usage, "FIRST_LINE", 0.0)
+    monkeypatch.setattr(usage, "_SETTLED", 0.01)
+    printed = threading.Event()
+    text = usage._progress_text
+    monkeypatch.setattr(usage, "_progress_text", lambda *args, **options: printed.set() or text(*args, **options))
+    monkeypatch.setattr("jointfrf.cli.cases.run", lambda args: 0 if quiet or printed.wait(60) else 1)
+    assert main(["cases", *(["--quiet"] if quiet else [])]) == 0
+    assert capsys.readouterr() == ("", "" if quiet else "jointfrf: cases: 0 s\n")
 
 
 def test_a_list_of_methods_names_one():
     result = run_command("identify", BARS, *JOINT, "--method", ",")
     assert result.returncode == 2
-    assert "argument --method: ',' is not one of compliance, inverse-substructuring" in result.stderr
+    assert "argument --method: unknown method ','; use one of compliance, inverse-substructuring" in result.stderr
 
 
 def test_a_message_is_one_line_whatever_a_file_is_called():

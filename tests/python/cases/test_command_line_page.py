@@ -3,6 +3,8 @@
 import re
 import shlex
 
+import pytest
+
 from command import run_command
 from documents import DOCUMENTS, ROOT
 from jointfrf.cli.configuration import with_configuration
@@ -23,6 +25,59 @@ def test_every_command_has_its_table():
 
 def test_tables_are_those_of_the_parsers():
     assert filled(PAGE) == PAGE, "python tests/python/support/option_tables.py docs/command-line.md"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_states_usage_defaults_and_examples(command):
+    """Required options have no brackets, the parser writes the defaults, and each command has an example."""
+    parser = command_parser(command)
+    text = parser.format_help()
+    usage = text.partition("\n\n")[0]
+    assert "[--" not in usage
+    assert all(name in usage for names in parser.ways for name in names)
+    for action in parser.arguments:
+        stated = re.findall(r"\(default[^)]*\)", action.help)
+        value = action.default
+        if action.option_strings and action.dest != "help" and value not in (None, [], False):
+            assert len(stated) == 1
+        assert action.help.endswith("".join(stated)), "option(otherwise=...) states a default in words"
+        assert len(stated) <= 1
+        shown = f" {action.metavar} " if action.metavar else f"{{{','.join(map(str, action.choices or ()))}}}"
+        if action.nargs != 0 and action.option_strings:
+            assert shown.strip() in text
+    assert parser.examples
+    for example in parser.examples:
+        assert example in text
+        parser.parse_words(shlex.split(example.partition(" > ")[0])[2:])
+
+
+def test_examples_of_the_help_run(tmp_path, monkeypatch):
+    """One after another in one folder, next to the files that come with the project."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cases").symlink_to(ROOT / "cases")
+    for command in COMMANDS:
+        if command in ("run", "study"):  # of cases whose tests run elsewhere
+            continue
+        for example in command_parser(command).examples:
+            words = shlex.split(example.partition(" > ")[0])[1:]
+            if words[:2] == ["levels", "--table"]:  # of docs/levels.md, which is a test
+                continue
+            result = run_command(*words)
+            assert result.returncode == 0, (example, result.stderr)
+    made = {path.name for path in tmp_path.iterdir()}
+    assert made >= {"joint.json", "bars.npz", "joint.bdf", "joint.inp", "assembly.uff", "a.uff", "my-case"}
+
+
+def test_options_that_the_only_way_to_call_a_command_requires(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = run_command("couple", "a.toml", "b.toml", "--joint", "j.toml", "--j", "1")
+    wanted = "jointfrf couple A B --joint FILE --j NODES --k NODES --output FILE"
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr == f"jointfrf: error: --k and --output are missing: {wanted}\n"
+    (tmp_path / "own.toml").write_text("[couple]\nk = 1\noutput = 'c.npz'\n")  # whoever gives them
+    result = run_command("couple", "a.toml", "b.toml", "--joint", "j.toml", "--j", "1", "--config", "own.toml")
+    assert "are missing" not in result.stderr
+    assert (result.returncode, "j.toml" in result.stderr) == (1, True)
 
 
 def test_a_page_that_is_old_is_seen():

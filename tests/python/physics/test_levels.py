@@ -288,14 +288,14 @@ def test_a_backbone_that_does_not_fit_its_assembly_is_an_error(believed_beam):
     good = jf.Backbone("A/1:y", **points, damping=[0.001])
     for backbone, options, text in (
         (jf.Backbone("A/99:y", **points, damping=[0.001]), {}, "channel 'A/99:y'"),
-        (good, {"dof": "theta_y"}, "dof must be one of theta_z, not 'theta_y'"),
+        (good, {"dof": "theta_y"}, "dof is 'theta_y'; use one of theta_z"),
         (good, {"laws": ["voigt"]}, "laws"),
     ):
         with pytest.raises(ValueError, match=text):
             jf.backbone_levels(whole, backbone, **options)
     for wrong, text in (
-        ({}, "either damping"),
-        ({"damping": [0.0]}, "damping must hold positive"),
+        ({}, "give one of them"),
+        ({"damping": [0.0]}, "damping has no numbers or one that is not positive"),
         ({"damping": [0.1, 0.2]}, "shape"),
         ({"force": [1.0], "labels": ["a", "b"]}, "labels"),
     ):
@@ -351,7 +351,7 @@ def test_the_command_reads_a_backbone(capsys, tmp_path):
             assert float(row["loss_factor_low"]) < k.imag / k.real < float(row["loss_factor_high"])
     assert main([*words, "A/1:y", "--laws", "power", "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert any("no law explains the levels: chi^2 of the best, power, is" in one for one in printed["warnings"])
+    assert any("no law fits the levels: chi^2 of the best, power, is" in one for one in printed["warnings"])
     lowest = printed["levels"]["theta_z"][0]
     assert lowest["stiffness"]["low"] < true.first_harmonic(np.array([lowest["amplitude"]]))[0].real
     assert main([*words, "A/1:y", "a.uff"]) == 2
@@ -363,18 +363,23 @@ def test_what_does_not_belong_together_is_an_error():
     fit = jf.identify(freq, jf.pollute(h, 0.03, seed=1), ["x"])
     force = jf.Drive("force", 1.0)
     for fits, drives, options, text in (
-        ([fit], [force, force], {}, "as many"),
-        ([fit, fit], [force, force], {"labels": ["a", "a"]}, "labels must name"),
-        ([fit], [jf.Drive("response", 1.0, "j:y")], {}, "'j:y' was held, but the fit has only j:x, k:x"),
-        ([fit], [jf.Drive("joint", 1.0, "y")], {}, "'y' was held"),
+        ([fit], [force, force], {}, "give one drive for each fit"),
+        ([fit, fit], [force, force], {"labels": ["a", "a"]}, "wrong labels; give 2 different names"),
+        (
+            [fit],
+            [jf.Drive("response", 1.0, "j:y")],
+            {},
+            "the fit has no 'j:y', which was controlled; use one of j:x, k:x",
+        ),
+        ([fit], [jf.Drive("joint", 1.0, "y")], {}, "the fit has no 'y'"),
         ([fit], [force], {"laws": ["voigt"]}, "laws"),
-        ([jf.fit_from_dict(jf.fit_to_dict(fit))], [force], {}, "no FRFs behind it"),
+        ([jf.fit_from_dict(jf.fit_to_dict(fit))], [force], {}, "loaded without its FRFs"),
     ):
         with pytest.raises(ValueError, match=text):
             jf.levels(fits, drives, **options)
-    with pytest.raises(ValueError, match="a force names no channel"):
+    with pytest.raises(ValueError, match="a force has no channel"):
         jf.Drive("force", 1.0, "x")
-    with pytest.raises(ValueError, match="channel must name what was held"):
+    with pytest.raises(ValueError, match="channel is empty"):
         jf.Drive("joint", 1.0)
 
 
@@ -425,18 +430,18 @@ def test_the_command_needs_no_models_of_frfs_at_the_joint(capsys, tmp_path):
     across = abs((h[:, 0] - h[:, 1]) / h[:, 1]) * 1e-4
     assert across.min() < one["lowest"] <= one["amplitude"] <= one["highest"] < across.max()
     assert main(["levels", files[0], "--level", "1e-4", "--held", "3:+x", *joint]) == 2
-    assert "test_1.npz has 1:+x, 2:+x at the joint" in capsys.readouterr().err
+    assert "test_1.npz has no such channel; use one of 1:+x, 2:+x" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
     ("words", "status", "text"),
     [
         (["a.uff"], 2, "--model is missing"),
-        (["--backbone", "b.csv", "--j", "1"], 2, "a backbone needs it"),
-        (["a.uff", "--model", "m.toml"], 2, "--level must name 1 levels"),
-        (["--model", "m.toml"], 2, "name the files"),
-        (["a.uff", "--model", "m.toml", "--table", "t.csv"], 2, "leave out those"),
-        (["--model", "m.toml", "--table", "t.csv"], 1, "line 2: the level 'high' is no number"),
+        (["--backbone", "b.csv", "--j", "1"], 2, "add it for a backbone"),
+        (["a.uff", "--model", "m.toml"], 2, "give 1, one for each file"),
+        (["--model", "m.toml"], 2, "no files are given"),
+        (["a.uff", "--model", "m.toml", "--table", "t.csv"], 2, "leave out FILE and --level"),
+        (["--model", "m.toml", "--table", "t.csv"], 1, "line 2: level 'high' is no number"),
         (["a.uff", "--model", "m.toml", "--level", "-1"], 1, "a: level must be positive"),
     ],
 )

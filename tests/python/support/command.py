@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 import warnings
 from typing import NamedTuple
+from unittest import mock
 
+from jointfrf.cli import usage
 from jointfrf.cli.main import main
 
 
@@ -25,6 +28,7 @@ def run_command(*words: object) -> Finished:
         contextlib.redirect_stdout(said),
         contextlib.redirect_stderr(complained),
         warnings.catch_warnings(),
+        mock.patch.object(usage, "FIRST_LINE", math.inf),  # a slow machine prints no progress
     ):
         warnings.resetwarnings()
         for category in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):

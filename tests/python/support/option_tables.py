@@ -10,7 +10,7 @@ import re
 import sys
 from pathlib import Path
 
-from jointfrf.cli.parser import COMMANDS, command_parser
+from jointfrf.cli.parser import COMMANDS, command_parser, with_value
 
 _PLACE = re.compile(r"(<!-- options of (\w+) -->\n).*?(<!-- end -->\n)", re.DOTALL)
 #: In the table of what all commands share.
@@ -18,11 +18,7 @@ COMMON = ("--help", "--json", "--quiet", "--config", "--no-config")
 
 
 def _row(action: argparse.Action) -> str:
-    name = ", ".join(action.option_strings)
-    if not name:
-        name = str(action.metavar or action.dest)
-    elif action.nargs != 0:
-        name += f" {action.metavar or '{' + ','.join(map(str, action.choices or ())) + '}'}"
+    name = ", ".join([*action.option_strings[:-1], with_value(action)])
     text = re.sub(r"\s+", " ", (action.help or "").replace("%%", "%"))
     if not action.option_strings and action.choices:
         text += f": {', '.join(map(str, action.choices))}"

@@ -247,7 +247,7 @@ SHAPES = {"frequency": [10.0, 20.0], "damping": 0.01, "phi": np.ones((2, 2)), "m
         ({"UR": np.ones(3)}, "upper residuals must be one for each DOF, or DOFs x DOFs"),
         ({"dofs": None}, "dofs is missing|does not name its DOFs"),
         ({"dofs": ["1:y", "1:uy"]}, "a DOF is named twice"),
-        ({"dofs": ["1:y"]}, "1 names, and the file holds 2 DOFs"),
+        ({"dofs": ["1:y"]}, "1 names; give 2, one for each DOF"),
         (
             {"phi": None, "modal_mass": None, "poles": [0, -1 + 20j], "A": np.ones((2, 2)), "driving_point": 0},
             "complex modes at 0 Hz have no scale",

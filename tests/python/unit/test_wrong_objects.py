@@ -161,7 +161,7 @@ def realised(**options):
         (lambda: jf.Joint([1.0], dofs=["x"]).export("ansys", {1: 2}), "nodes must be two different nodes, not"),
         (lambda: jf.Joint([1.0], dofs=["x"]).export("ansys", {"x": 1, 3: 2}), "nodes must be a list of node numbers"),
         (lambda: jf.assemble(chain(), chain(), 1e3, [1], [0]), "joint must be a Joint or a LawJoint, not float"),
-        (lambda: jf.levels(3, [jf.Drive("force", 1.0)]), "fits must be a sequence of Fit"),
+        (lambda: jf.levels(3, [jf.Drive("force", 1.0)]), "give a sequence of Fit"),
         (lambda: jf.write_plan(3, "plan.html"), "plan must be a MeasurementPlan or a JointFrfPlan, not int"),
         (
             lambda: jf.io.FrfSet([1.0], [CHANNEL], [CHANNEL], np.ones((1, 1, 1)), "receptance").matrix(3, [CHANNEL]),
