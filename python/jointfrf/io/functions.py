@@ -14,12 +14,10 @@ from jointfrf.frf.frf_set import Channel
 from jointfrf.frf.merge import same_lines
 from jointfrf.io.file_format import FrfArrays, FrfMapping
 from jointfrf.io.labels import channels_of
-from jointfrf.io.units import parse_unit
+from jointfrf.io.units import SAME_FACTOR, parse_frequency_unit, parse_unit, si_label
 
 __all__ = ["LooseFunction", "arrays_of_functions", "functions_of_sdynpy", "functions_of_testlab"]
 
-#: How far the factor to SI of a file may be from that of its unit, relative to it: files give four digits or more.
-_SAME_FACTOR = 1e-3
 #: The function type of FRFs in sdynpy, as in Universal Files.
 _FRF = 4
 
@@ -34,6 +32,7 @@ class LooseFunction(NamedTuple):
     is_coherence: bool = False
     unit: str = ""
     quantity: str = ""
+    frequency_unit: str = ""
 
     def __str__(self) -> str:
         return f"{'coherence' if self.is_coherence else 'FRF'} {self.response} / {self.excitation}"
@@ -72,12 +71,15 @@ def arrays_of_functions(functions: Sequence[LooseFunction], where: str, limit: R
             if each.response in row_of and each.excitation in column_of:
                 coherence[:, row_of[each.response], column_of[each.excitation]] = each.values
             continue
-        if (each.unit, each.quantity) != (first.unit, first.quantity):
-            said = [" ".join(filter(None, (one.quantity, f"[{one.unit or 'no unit'}]"))) for one in (first, each)]
+        if each[5:] != first[5:]:
+            said = [f"{one.quantity} [{one.unit or 'no unit'}]".strip() for one in (first, each)]
             raise FileContentError(f"{where}: {first} is {said[0]}, {each} is {said[1]}: they must be alike")
         h[:, row_of[each.response], column_of[each.excitation]] = each.values
     known = None if np.isnan(coherence).all() else coherence
-    return FrfArrays(first.freq_hz, h, "freq,out,in", responses, excitations, first.quantity, first.unit, known)
+    return FrfArrays(
+        first.freq_hz, h, "freq,out,in", responses, excitations, first.quantity, first.unit, known,
+        frequency_unit=first.frequency_unit,
+    )  # fmt: skip
 
 
 def functions_of_sdynpy(data: Any, function_type: Any, where: str) -> list[LooseFunction]:
@@ -144,10 +146,12 @@ def _functions(record: Mapping[str, Any], mapping: FrfMapping, where: str) -> It
         columns = values.T
     if not (is_coherence or columns.dtype.kind == "c"):
         return  # spectra and time histories of the same export
-    unit = "" if is_coherence else _unit(y_values, mapping, where)
+    unit = "" if is_coherence else _unit(y_values)
     pairs = _pairs(about, columns.shape[1], mapping, where)
     for (response, excitation), column in zip(pairs, columns.T, strict=True):
-        yield LooseFunction(response, excitation, freq_hz, column, is_coherence, unit)
+        yield LooseFunction(
+            response, excitation, freq_hz, column, is_coherence, unit, frequency_unit=_frequency_unit(x_values)
+        )
 
 
 def _part(record: Mapping[str, Any], name: str, where: str) -> Mapping[str, Any]:
@@ -183,23 +187,36 @@ def _lines(x_values: Mapping[str, Any], values: NDArray[Any], where: str) -> NDA
     return np.asarray(start + step * np.arange(size)) if "increment" in x_values else given
 
 
-def _unit(y_values: Mapping[str, Any], mapping: FrfMapping, where: str) -> str:
-    """Return the unit of the values: the label, unless the file gives a factor that says otherwise."""
-    if mapping.unit is not None:
-        return mapping.unit
-    quantity = y_values.get("quantity")
-    quantity = quantity if isinstance(quantity, Mapping) else {}
-    label = (_texts(quantity.get("label")) or [""])[0].strip()
-    transformation = quantity.get("unit_transformation")
-    factor = transformation.get("factor", 1.0) if isinstance(transformation, Mapping) else 1.0
+def _unit(y_values: Mapping[str, Any]) -> str:
+    """Return the unit of the values.
+
+    The label is the unit in which Testlab shows them. They are saved in SI (MKS), and the factor goes from there to the
+    label: 0.101972 of g. If label, factor and text disagree, the label that is returned is not understood.
+    """
+    quantity, label = _axis(y_values)
     unit = parse_unit(label)
-    to_si = float(np.ravel(factor)[0])
-    if unit is not None and not any(abs(to_si / sound - 1) < _SAME_FACTOR for sound in (1.0, unit.to_si)):
-        raise FileContentError(
-            f"{where} gives the unit '{label}' with the factor {to_si:g}: whether the values are in that unit or in SI "
-            "units is not clear; say unit= by mapping, the unit of the values"
-        )
-    return label
+    if unit is None:
+        return label
+    transformation = quantity.get("unit_transformation")
+    given = transformation.get("factor") if isinstance(transformation, Mapping) else None
+    is_mks = "MKS" in " ".join(_texts(quantity.get("info"))).upper()
+    if given is None and not is_mks:
+        return label if unit.to_si == 1.0 else f"{label}, no factor"
+    factor = 1.0 / unit.to_si if given is None else float(np.ravel(given)[0])
+    return si_label(unit.exponents) if abs(factor * unit.to_si - 1.0) < SAME_FACTOR else f"{label}, factor {factor:g}"
+
+
+def _frequency_unit(x_values: Mapping[str, Any]) -> str:
+    """Return the unit of the frequencies; any other than Hz, which need not be the one of the values, with a word."""
+    _, label = _axis(x_values)
+    return label if not label or parse_frequency_unit(label) == 1.0 else f"{label}, saved in MKS"
+
+
+def _axis(values: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
+    """Return the description of an axis, and its label."""
+    quantity = values.get("quantity")
+    quantity = quantity if isinstance(quantity, Mapping) else {}
+    return quantity, (_texts(quantity.get("label")) or [""])[0].replace("\0", " ").strip()
 
 
 def _pairs(about: Mapping[str, Any], n: int, mapping: FrfMapping, where: str) -> list[tuple[Channel, Channel]]:

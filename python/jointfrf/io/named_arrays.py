@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
+from dataclasses import fields as dataclass_fields
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,7 @@ from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, FrfSet
 from jointfrf.frf.setups import SetUps
-from jointfrf.io.file_format import FrfArrays, FrfMapping
+from jointfrf.io.file_format import TIME_DATA, FrfArrays, FrfMapping
 from jointfrf.io.functions import arrays_of_functions, functions_of_sdynpy, functions_of_testlab
 from jointfrf.kernel.arguments import as_array, check_type
 from jointfrf.spelling import some_of
@@ -49,9 +51,15 @@ _KNOWN = {
     "coherence": ("coherence", "coh", "gamma2", "coherences"),
     "averages": ("averages", "n_averages", "navg", "n_avg", "number_of_averages"),
 }  # fmt: skip
+#: Options that have an effect on functions one by one, and on arrays that are found by their names.
+_TAKEN_BY_SDYNPY = ("direction", "components")
+_TAKEN_BY_TESTLAB = ("responses", "excitations", *_TAKEN_BY_SDYNPY)
+_TAKEN_BY_ARRAYS = (*(each.name for each in dataclass_fields(FrfMapping)), "frequency")
 #: Names of FRFs that say their quantity, and of frequencies in rad/s.
 _QUANTITIES = ("accelerance", "inertance", "mobility", "receptance")
 _RADIANS = ("omega", "w")
+#: Names of times, which files of FRFs do not have.
+_TIMES = ("t", "time", "times", "time_s")
 
 
 def arrays_of_fields(
@@ -81,7 +89,8 @@ def arrays_of_fields(
     functions = functions_of_sdynpy(fields.get("data"), fields.get("function_type"), where)
     exported = functions_of_testlab(fields, mapping, where) if mapping.h is None else None
     if functions or exported is not None:
-        return arrays_of_functions(functions or exported or [], where, limit)
+        found = arrays_of_functions(functions or exported or [], where, limit)
+        return replace(found, takes=_TAKEN_BY_TESTLAB if exported is not None else _TAKEN_BY_SDYNPY)
     return _mapped_arrays(fields, mapping, where)
 
 
@@ -195,11 +204,12 @@ def _own_arrays(fields: Mapping[str, Any], where: str) -> FrfArrays:
         fields["responses"],
         fields["excitations"],
         str(fields["quantity"]),
-        str(fields.get("unit", "")),
+        str(fields.get("unit") or _UNITS[POWER_OF_I_OMEGA.get(str(fields["quantity"]), 0)]),
         fields.get("coherence"),
         fields.get("averages"),
         {int(node): place.astype(np.float64) for node, place in zip(nodes.ravel(), places, strict=True)},
         _setups_of(fields, where),
+        takes=(),
     )
 
 
@@ -211,19 +221,21 @@ def _mapped_arrays(content: Mapping[str, Any], mapping: FrfMapping, where: str) 
     for each, name, what in ((freq, "freq_hz", "frequencies"), (h, "h", "FRFs")):
         if each is None:
             known = ", ".join(_KNOWN[name])
+            times = [each for each in flat if each.rpartition(".")[2].lower() in _TIMES]
+            if h is None and times:
+                raise FileContentError(f"{where} has times ({times[0]}) and no FRFs ({known}); {TIME_DATA}")
             raise FileContentError(
                 f"{where} has no field for the {what} ({known}): say which of {_names(flat)} by mapping"
             )
     assert freq is not None
     assert h is not None
     path, values = freq
-    freq_hz = np.asarray(values)
-    if path.rpartition(".")[2].lower() in _RADIANS and freq_hz.dtype.kind in "iuf":
-        freq_hz = freq_hz / (2 * np.pi)
+    name = path.rpartition(".")[2].lower()
+    frequency_unit = "rad/s" if name in _RADIANS else "Hz" if "hz" in name else ""
     quantity = _text(found["quantity"])
     last = h[0].rpartition(".")[2].lower()
     return FrfArrays(
-        freq_hz,
+        np.asarray(values),
         h[1],
         mapping.axes or "",
         _channels(found, "response", where),
@@ -232,6 +244,8 @@ def _mapped_arrays(content: Mapping[str, Any], mapping: FrfMapping, where: str) 
         _text(found["unit"]),
         _value(found["coherence"]),
         _value(found["averages"]),
+        frequency_unit=frequency_unit,
+        takes=_TAKEN_BY_ARRAYS,
     )
 
 

@@ -14,7 +14,9 @@ from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit, check_file, damage_named, head_of, text_of
 from jointfrf.io.fe.bulk import bulk_cards, bulk_number, is_bulk
 from jointfrf.io.fe.matrix_format import dof_name
+from jointfrf.io.file_format import Reading
 from jointfrf.io.uff_file import UniversalFile, node_coordinates
+from jointfrf.io.units import StatedUnits
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["NodeFile", "read_dof_names", "read_nodes"]
@@ -198,11 +200,12 @@ def _of_ansys(path: Path) -> NodeFile:
 
 
 def _of_universal(path: Path) -> NodeFile:
-    file = UniversalFile(path)
+    has_units = bool(UniversalFile(path).datasets(164))
+    file = UniversalFile(path, Reading(units=StatedUnits(coordinates="" if has_units else "m")))
     numbers = [int(row.split()[0]) for number in file.datasets(15, 2411) for row in file.records(number) if row.split()
                and row.split()[0].isdecimal()]  # fmt: skip
     held = node_coordinates(file, set(numbers))
-    return NodeFile({str(node): place for node, place in held.items()}, is_si=True)
+    return NodeFile({str(node): place for node, place in held.items()}, is_si=has_units)
 
 
 def _of_table(path: Path) -> NodeFile:
