@@ -38,7 +38,7 @@ _FILLERS = re.compile(
 )  # fmt: skip
 _QUANTITY = re.compile(r"\b(receptance|mobility|accelerance|inertance)\b", re.IGNORECASE)
 #: A channel as in ``102:+y`` or ``bar:102 -Z``, and response / excitation.
-_CHANNEL = r"[^\s/,;()\[\]]*?\d+[\s:._]*[+-]?r?[xyz][+-]?"
+_CHANNEL = r"(?<![^\s/,;()\[\]])[^\s/,;()\[\]]*?(?<!\d)\d++[\s:._]*+[+-]?r?[xyz][+-]?"
 _PAIR = re.compile(rf"({_CHANNEL})\s*/\s*({_CHANNEL})(?![a-z])", re.IGNORECASE)
 #: Names of frequencies and of times in the first column.
 _FREQUENCY = {
@@ -51,6 +51,7 @@ _BRACKETED = re.compile(r"([^()\[\]{}<>]*)[(\[{<](.+)[)\]}>]")
 _BETWEEN = re.compile(r"[\s,;:/_-]+(?:in )?")
 #: Words of the first column, of which none is a logarithm.
 _WORDS, _LOGARITHM = re.compile(r"[^\W\d_]*(?:[ _.-][^\W\d_]+)*"), re.compile(r"\b(log|lg|ln)\b", re.IGNORECASE)
+_WORD, _UNIT_BEGINS = re.compile(r"[a-z]+", re.IGNORECASE), re.compile(r"[(\[{<]|\bdb\b", re.IGNORECASE)
 #: Factors of coherences by their units.
 _SHARES = {"": 1.0, "-": 1.0, "1": 1.0, "%": 0.01}
 #: Lines below which no heading is sought that a preamble may hide, and what a heading looks like.
@@ -252,17 +253,17 @@ def _column(name: str, where: str) -> _Column:
             before, after = before.rstrip()[:-1], after.lstrip()[1:]
         rest = " ".join(f"{before} {after}".split())
         # Behind a bracket and dB only the unit follows, or a part that stands nowhere before: [dB re 1 m/N] mag.
-        first = re.split(r"[(\[{<]|\bdb\b", rest, maxsplit=1, flags=re.IGNORECASE)[0]
-        named = _parts_in(first) or _parts_in(re.split(r"[)\]}>]", rest)[-1])
-        if len({_PARTS[part.lower()] for part in named}) == 1:
+        named = _parts_in(rest, 0, _UNIT_BEGINS.search(rest)) or _parts_in(rest, _behind_brackets(rest), None)
+        if len({part for part, _ in named}) == 1:
+            part, place = named[0]
             try:
                 pair = channels_of("heading", [match[1]])[0], channels_of("heading", [match[2]])[0]
             except ValueError as error:
                 raise FileContentError(f"{where} {error}") from error
-            rest = re.sub(rf"\b{named[0]}(?![a-z])", " ", rest, count=1)
+            rest = f"{rest[: place.start()]} {rest[place.end() :]}"
             quantity = _QUANTITY.search(rest)
             unit = " ".join(_FILLERS.sub(" ", _QUANTITY.sub(" ", rest)).strip(" ,;:/_-|").split())
-            return _Column(pair, _PARTS[named[0].lower()], _without_in(unit), quantity[1].lower() if quantity else "")
+            return _Column(pair, part, _without_in(unit), quantity[1].lower() if quantity else "")
     raise FileContentError(
         f"{where}: unknown column {name[:60]!r}; name response / excitation and real, imag, magnitude, phase or "
         "coherence, such as '102:+y / 101:+y real [m/N]'"
@@ -277,8 +278,15 @@ def _without_in(unit: str) -> str:
     return unit if found is not None and found.exponents in QUANTITIES else unit.removeprefix("in ")
 
 
-def _parts_in(text: str) -> list[str]:
-    return [word for word in re.findall(r"[a-z]+", text, re.IGNORECASE) if word.lower() in _PARTS]
+def _behind_brackets(text: str) -> int:
+    """Return where the text behind the last bracket begins; its end without brackets."""
+    return 1 + max(map(text.rfind, ")]}>")) or len(text)
+
+
+def _parts_in(text: str, start: int, end: re.Match[str] | None) -> list[tuple[str, re.Match[str]]]:
+    """Return the parts of an FRF that words name, and where they stand."""
+    words = _WORD.finditer(text, start, len(text) if end is None else end.start())
+    return [(_PARTS[word[0].lower()], word) for word in words if word[0].lower() in _PARTS]
 
 
 def _functions(

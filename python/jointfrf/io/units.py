@@ -127,9 +127,9 @@ _STRAY, _RAISED = re.compile("Â(?=[°²³µ·])"), re.compile("[⁺⁻⁰¹²³
 _OF_FORCE = re.compile(r"\b(lb|pound|kg|kilogram)s?[\s_-]*(?:\(\s*f(?:orce)?\s*\)|f(?:orce)?)(?![a-z])", re.IGNORECASE)
 _ABBREVIATION, _POINT = re.compile(r"(?<=[A-Za-z])\.(?=\s|$|[/*)^])"), re.compile(r"(?<!\d)\.|\.(?!\d)")
 #: A number, a name or a sign of a unit.
-_TOKEN = re.compile(r"\s*(\d+(?:\.\d+)?(?:e[-+]?\d+)?|[a-z]+|[-^*/()])", re.IGNORECASE)
+_TOKEN = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?|[a-z]+|[-^*/()]", re.IGNORECASE)
 #: A level and its reference: ``dB re 1 m/N``, ``dB (ref 1 (m/s^2)/N)``.
-_LEVEL = re.compile(r"[(\[{\s]*db\s*[(\[{,]?\s*(?:re|rel|ref|reference)\b\s*[.:=]?\s*(?:to\b)?(.+)", re.IGNORECASE)
+_LEVEL = re.compile(r"[(\[{ ]*db ?[(\[{,]? ?(?:re|rel|ref|reference)\b ?[.:=]? ?(?:to\b)?(.+)", re.IGNORECASE)
 #: Letters of the longest label that is read.
 _LONGEST = 200
 #: How far a factor that a file gives may differ from that of its unit, relative to it: files give four digits or more.
