@@ -12,6 +12,7 @@ from frf_files import FREQ_HZ, frf_set, names, write_mat
 from jointfrf.errors import FileContentError
 from jointfrf.io import read_frfs, write_hdf5, write_npz
 from jointfrf.io.units import StatedUnits, parse_frequency_unit, parse_level, parse_phase_unit, parse_unit
+from shared_data import shared_data
 from uff_writer import VALUES, function
 
 POUND, GRAVITY, INCH = 4.4482216152605, 9.80665, 0.0254
@@ -177,6 +178,34 @@ def test_time_data_are_named(tmp_path):
     np.savez(tmp_path / "a.npz", t=FREQ_HZ, x=FREQ_HZ)
     with pytest.raises(FileContentError, match=r"has times \(t\) and no FRFs .*estimate FRFs .*pyFRF"):
         read_frfs(tmp_path / "a.npz")
+
+
+# ---------------------------------------------------------------- files in which users met wrong values
+
+RIGHT = "01-csv-units-in-round-brackets/right.csv"
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["01-csv-units-in-round-brackets/give-kHz.csv", "01-csv-units-in-round-brackets/give-phase-rad.csv",
+     "03-testlab-mat-saved-in-MKS/give-g-per-N.mat", "05-uff-unit-not-understood/give-micrometre-latin1.uff",
+     "05-uff-unit-not-understood/give-mils.uff"],
+)  # fmt: skip
+def test_reported_files_are_read_rightly(name):
+    right = read_frfs(shared_data("reports", *RIGHT.split("/"))).receptance()
+    found = read_frfs(shared_data("reports", *name.split("/"))).receptance()
+    np.testing.assert_allclose(found.freq_hz, right.freq_hz, rtol=1e-6)
+    np.testing.assert_allclose(found.matrix(right.responses, right.excitations), right.h, rtol=1e-4)
+
+
+def test_a_reported_text_without_a_heading_is_refused():
+    with pytest.raises(FileContentError, match=r"no heading that names frequencies and channels, .*give skip_lines="):
+        read_frfs(shared_data("reports", "17-text-with-a-preamble", "give-analyser.txt"))
+
+
+def test_a_reported_heading_in_radians_per_second():
+    found = read_frfs(shared_data("reports", "u11-omega-heading", "48_rad_s.csv"))
+    np.testing.assert_allclose(np.diff(found.freq_hz), 2.0, rtol=1e-3)
 
 
 # ---------------------------------------------------------------- no label gives wrong values
