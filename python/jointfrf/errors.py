@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.spelling import visible
+from jointfrf.spelling import message
 
 __all__ = [
     "ConvergenceWarning",
@@ -46,17 +46,17 @@ class SingularLineError(np.linalg.LinAlgError):
 
 
 class FileContentError(ValueError):
-    """A file cannot be read, or lacks something that is needed; one line, whatever the file is called."""
+    """A file cannot be read, or lacks something; one line of bounded length, whatever the file is called."""
 
-    def __init__(self, message: str) -> None:
-        super().__init__(visible(" ".join(message.splitlines())))
+    def __init__(self, text: str) -> None:
+        super().__init__(message(" ".join(text.splitlines())))
 
 
 class FileContentWarning(UserWarning):
-    """Something in a file had to be assumed or left out; one line, whatever the file contains."""
+    """Something in a file had to be assumed or left out; one line of bounded length, whatever the file contains."""
 
-    def __init__(self, message: str) -> None:
-        super().__init__(visible(" ".join(message.splitlines())))
+    def __init__(self, text: str) -> None:
+        super().__init__(message(" ".join(text.splitlines())))
 
 
 class FrfCheckWarning(UserWarning):

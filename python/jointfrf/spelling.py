@@ -1,13 +1,36 @@
-"""Words of messages: what was misspelt, the first few of many, invisible characters of files escaped."""
+"""Words of messages: a proposal for a misspelt word, the first few of many, escaped characters, a bound of length."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-__all__ = ["did_you_mean", "look_alike", "some_of", "visible"]
+__all__ = ["LONGEST_MESSAGE", "cut", "did_you_mean", "look_alike", "message", "some_of", "visible"]
 
 #: Categories of invisible characters, which a terminal, a card or a page may interpret.
 _UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
+
+#: Most characters of a message, whatever a file or a study of a stranger contains.
+LONGEST_MESSAGE = 2000
+
+
+def cut(text: str, most: int = LONGEST_MESSAGE) -> str:
+    """Return a text, or the beginning and the end of one that is too long: the remedy stands at the end.
+
+    Examples
+    --------
+    >>> from jointfrf.spelling import cut
+    >>> cut("bolt", 9), cut("bolt, nut and washer", 11)
+    ('bolt', 'bolt...sher')
+    """
+    if len(text) <= most:
+        return text
+    each = (most - 3) // 2
+    return f"{text[:each]}...{text[len(text) - each :]}"
+
+
+def message(text: str) -> str:
+    """Return a message to a user: invisible characters are escaped, and it has at most `LONGEST_MESSAGE` characters."""
+    return cut(visible(cut(text)))
 
 
 def look_alike(word: str, known: Iterable[str]) -> str:

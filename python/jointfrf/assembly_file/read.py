@@ -26,8 +26,8 @@ from jointfrf.assembly_file.keys import (
     ReceptancesPart,
     Unknowns,
 )
-from jointfrf.assembly_file.modes import ModalStructure
-from jointfrf.cases.substructures import MeasuredStructure, ModelStructure, Structure
+from jointfrf.assembly_file.modes import ModalStructure, ModesKeys
+from jointfrf.cases.substructures import SUBSTRUCTURES, MeasuredStructure, ModelStructure, Structure
 from jointfrf.dofs import is_rotation
 from jointfrf.frf.frf_set import Channel
 from jointfrf.identification.joint_file import read_joint
@@ -55,7 +55,16 @@ from jointfrf.toml.table import TomlTable, read_toml
 if TYPE_CHECKING:
     from jointfrf.report.sketch import SketchedPart
 
-__all__ = ["AssemblyFile", "AssemblyPart", "check_dofs", "named_dof", "read_assembly_file", "read_part", "unknown_of"]
+__all__ = [
+    "AssemblyFile",
+    "AssemblyPart",
+    "check_dofs",
+    "named_dof",
+    "read_assembly_file",
+    "read_part",
+    "read_structure",
+    "unknown_of",
+]
 
 #: What a word takes as relative standard deviation: coefficients of variation of structural steel (JCSS Probabilistic
 #: Model Code, parts 2.1 and 3.2); damping is guessed; sections are rolled or milled to 1 %, lengths cut to 1 mm in
@@ -290,6 +299,27 @@ def read_part(path: Path | str) -> AssemblyPart:
     """
     keys = read_keys(read_toml(Path(path)), *get_args(PartKeys))
     return AssemblyPart.of_keys(keys, np.ones(1))
+
+
+def read_structure(table: TomlTable) -> ModelStructure | ModalStructure:
+    """Read a model, or modes, from a table with the keys of a substructure of a case or of a part of an assembly.
+
+    Parameters
+    ----------
+    table : TomlTable
+        With ``joint`` it is a part, of which the joint and the unknown numbers are not used.
+
+    Raises
+    ------
+    FileContentError
+        A key is missing or wrong; FRFs are named instead of a model.
+    """
+    if table.content.get("model") == "receptances":
+        raise table.wrong("model", "a file of FRFs is named by itself, not by a TOML file")
+    kinds: tuple[Any, ...] = get_args(PartKeys) if "joint" in table.content else (*SUBSTRUCTURES, ModesKeys)
+    found = read_keys(table, *kinds).structure(np.ones(1))
+    assert isinstance(found, ModelStructure | ModalStructure)
+    return found
 
 
 def _by_name(own: Unknowns, takes: Sequence[str], meant: Mapping[str, str], table: TomlTable) -> dict[str, Prior]:

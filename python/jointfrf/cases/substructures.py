@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from msgspec import field
@@ -26,7 +26,7 @@ from jointfrf.models.matrices import is_symmetric
 from jointfrf.models.model import Ground, chain
 from jointfrf.models.points import Coupling, PointModel, PointPatch, couple_points
 from jointfrf.solids.brick_beam import Face, Hole, Preset, brick_beam
-from jointfrf.toml.declared import Keys, NotNegative, Positive, key, read_keys
+from jointfrf.toml.declared import Keys, NotNegative, Positive, key
 from jointfrf.toml.table import TomlTable
 
 __all__ = [
@@ -38,7 +38,6 @@ __all__ = [
     "PointPatchKeys",
     "Structure",
     "SubstructureKeys",
-    "read_model",
 ]
 
 
@@ -400,19 +399,3 @@ class ReceptancesKeys(SubstructureKeys, tag="receptances"):
 
 #: The kinds of substructures, which `model` distinguishes.
 SUBSTRUCTURES = (ChainKeys, BeamKeys, BrickBeamKeys, MatricesKeys, ReceptancesKeys)
-
-
-def read_model(table: TomlTable) -> ModelStructure:
-    """Read a model from a table that is not part of a case.
-
-    Raises
-    ------
-    FileContentError
-        A key is missing or wrong; FRFs are named instead of a model.
-    """
-    models: tuple[Any, ...] = SUBSTRUCTURES
-    if table.content.get("model") == "receptances":
-        raise table.wrong("model", "a file of FRFs is named by itself, not by a TOML file")
-    found = read_keys(table, *models).structure(np.ones(1))
-    assert isinstance(found, ModelStructure)
-    return found

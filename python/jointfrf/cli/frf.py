@@ -12,13 +12,15 @@ from typing import Any
 
 import numpy as np
 
+from jointfrf.assembly_file.modes import ModalStructure
+from jointfrf.assembly_file.read import read_structure
 from jointfrf.cases.keys import MOST_LINES
-from jointfrf.cases.substructures import ModelStructure, read_model
+from jointfrf.cases.substructures import ModelStructure
 from jointfrf.cli.measured_file import READING, add_reading_arguments, parse_band, reading_options, words
 from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import OptionWarning, Output, UsageError, waiting, warn_of_ignored
 from jointfrf.dofs import DIRECTIONS, direction_places
-from jointfrf.errors import FileContentError
+from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.extras import check_extras
 from jointfrf.frf.merge import same_lines
 from jointfrf.io import Channel, FrfSet, read_frfs, write_frfs
@@ -47,7 +49,8 @@ def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         f"Compute receptances of a model and write them as {format_names(written=True)}. The model is a TOML file with "
-        "the keys of a substructure of a case (chain, beam, brick-beam, matrices), or matrices named by options."
+        "the keys of a substructure of a case (chain, beam, brick-beam, matrices, modes) or of a part of an assembly, "
+        "or matrices named by options."
     )
     parser.add_argument("model", nargs="?", type=Path, help="TOML file of a model; or --stiffness and --mass")
     parser.option("--output FILE", f"file to write: {format_names(written=True)}", Path)
@@ -69,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     if args.output is None:
         raise UsageError("--output is missing: the file to write, such as --output model.uff")
     check_target(args.output)
-    structure = read_model(_table(args))
+    structure = read_structure(_table(args))
     freq_hz = lines_of(args)
     if args.lines_of is not None:
         if freq_hz is not None:
@@ -84,7 +87,12 @@ def run(args: argparse.Namespace) -> int:
     with waiting("receptances"):
         frfs, named = frfs_of_model(structure, freq_hz, args.points, source)
     write_frfs(args.output, frfs)
-    out.say(frfs.summary(), *(f"node {number}: {name}" for name, number in named.items()), f"wrote {args.output}")
+    out.say(
+        *_about(structure),
+        frfs.summary(),
+        *(f"node {number}: {name}" for name, number in named.items()),
+        f"wrote {args.output}",
+    )
     out.give(
         {
             "written": str(args.output),
@@ -174,10 +182,19 @@ def is_model(path: Path) -> bool:
     return path.suffix.lower() == ".toml"
 
 
+def _about(structure: ModelStructure | ModalStructure) -> list[str]:
+    """Return the lines that state what files of a model or of modes contain; doubts become warnings."""
+    about = structure.about if isinstance(structure, ModalStructure) else [structure.about] * bool(structure.about)
+    for line in about:
+        if line.startswith("warning: "):
+            warnings.warn(line.removeprefix("warning: "), FileContentWarning, stacklevel=3)
+    return [line for line in about if not line.startswith("warning: ")]
+
+
 def frfs_of_model(
-    structure: ModelStructure, freq_hz: FloatArray, points: Sequence[str] | None, source: str
+    structure: ModelStructure | ModalStructure, freq_hz: FloatArray, points: Sequence[str] | None, source: str
 ) -> tuple[FrfSet, dict[str, int]]:
-    """Compute receptances of a model between some of its DOFs, or all.
+    """Compute receptances of a model, or of modes, between some of its DOFs, or all.
 
     Returns
     -------
@@ -192,13 +209,17 @@ def frfs_of_model(
     ValueError
         The model has no such DOF.
     """
-    dofs = list(structure.model.dofs) if points is None else list(points)
+    known = structure.modes.dofs if isinstance(structure, ModalStructure) else structure.model.dofs
+    dofs = list(known) if points is None else list(points)
     if points is None and len(dofs) > _MOST_DOFS:
         raise UsageError(f"{source} has {len(dofs)} DOFs: name those wanted by --points, such as {dofs[0]},{dofs[-1]}")
     channels, named = _channels(dofs)
     h = structure.receptance(freq_hz, dofs)
     places: Mapping[int, FloatArray] = {}
-    if structure.x is not None:
+    if isinstance(structure, ModalStructure):
+        places = {int(node): at for node, at in structure.places.items() if node.isdecimal()}
+        places = {node: at for node, at in places.items() if node in {c.node for c in channels}}
+    elif structure.x is not None:
         places = {c.node: np.array([structure.x[c.node - 1], 0.0, 0.0]) for c in channels}
     return FrfSet(freq_hz, channels, channels, h, coordinates=places, source=source), named
 
@@ -262,8 +283,11 @@ def read_structures(paths: Sequence[Path], freq_hz: FloatArray | None, **options
         if path in measured:
             found.append(measured[path])
             continue
-        frfs, _ = frfs_of_model(read_model(read_toml(path)), freq_hz, None, str(path))
-        found.append(replace(frfs, coordinates={}))  # which count from an end of the model
+        structure = read_structure(read_toml(path))
+        _about(structure)
+        frfs, _ = frfs_of_model(structure, freq_hz, None, str(path))
+        is_global = isinstance(structure, ModalStructure)  # places in a model count from one of its ends
+        found.append(frfs if is_global else replace(frfs, coordinates={}))
     return found
 
 

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from jointfrf.spelling import visible
+from jointfrf.spelling import cut, message, visible
 
 __all__ = [
     "OptionWarning",
@@ -51,8 +51,8 @@ _WORDS = tuple(
     for python, option in (
         (r"\bsay (\w+)= by mapping", r"say --map \1=..."),
         (r"\bor (\w+)= by mapping", r"or --map \1=..."),
-        (r"\b(by|of) mapping\b", r"\1 --map"),
-        (r"\bmapping names\b", "--map names"),
+        (r"\bmapping (\w+=)", r"--map \1"),
+        (r"\b(by|of|in) mapping\b", r"\1 --map"),
         (r"\bgive axes=", "give --map axes="),
         (r"\bmapping (\w+)=", r"--map \1="),
         (r"\bgive unit=(?=')", "give --unit "),
@@ -76,9 +76,9 @@ _WORDS = tuple(
 )
 
 
-def complain(kind: str, message: object) -> None:
+def complain(kind: str, about: object) -> None:
     """Print a warning or an error as one line that does nothing to a terminal: the name of a file may hold anything."""
-    print(f"jointfrf: {kind}: {visible(in_options(str(message)))}", file=sys.stderr)
+    print(f"jointfrf: {kind}: {message(in_options(cut(str(about))))}", file=sys.stderr)
 
 
 def in_options(text: str) -> str:
@@ -118,7 +118,7 @@ class Output:
     def give(self, content: Mapping[str, Any]) -> None:
         """Print the result as JSON where that is wanted, with all warnings at its top level."""
         if self._is_json:
-            warned = [in_options(str(text)) for text in (*content.get("warnings", ()), *self._warned)]
+            warned = [in_options(cut(str(text))) for text in (*content.get("warnings", ()), *self._warned)]
             whole = {**content, "warnings": list(dict.fromkeys(warned))}
             print(json.dumps(plain(whole), indent=2, allow_nan=False))
 

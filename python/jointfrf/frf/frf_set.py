@@ -36,7 +36,7 @@ POWER_OF_I_OMEGA = {"receptance": 0, "mobility": 1, "accelerance": 2}
 _PLURALS = {"receptance": "receptances m/N", "mobility": "mobilities (m/s)/N", "accelerance": "accelerances (m/s^2)/N"}
 #: Names of directions, and of channels.
 _DIRECTION = re.compile(r"([+-]?)(r?[xyz])")
-_CHANNEL = re.compile(r"(\d+)\s*:?\s*([+-]?r?[xyz])")
+_CHANNEL = re.compile(r"(\d+)\s*(?::\s*)?([+-]?r?[xyz])")
 #: Names of missing FRFs that a message lists.
 _NAMES_SHOWN = 10
 #: How far above 1 single precision may leave a coherence.

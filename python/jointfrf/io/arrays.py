@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,16 +12,19 @@ from numpy.typing import ArrayLike, NDArray
 from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
 from jointfrf.io.file_format import FrfArrays, Reading
-from jointfrf.io.labels import channels_of, channels_of_table, is_table
+from jointfrf.io.labels import channels_of_table, is_table
 from jointfrf.io.units import QUANTITIES, parse_frequency_unit, parse_unit
 from jointfrf.kernel.arguments import as_array, check_type
+from jointfrf.spelling import some_of
 
-__all__ = ["as_frf_set", "contradiction", "frfs_of_arrays"]
+__all__ = ["as_frf_set", "contradiction", "finite_frfs", "frfs_of_arrays"]
 
 #: Names of the axes of an array of FRFs.
 _AXES = ("freq", "out", "in")
 #: Orders that the sizes of an array may show, where responses are before excitations.
 _ORDERS = ([0, 1, 2], [1, 2, 0], [1, 0, 2])
+#: FRFs that a message names.
+_SHOWN = 3
 
 
 def frfs_of_arrays(
@@ -109,7 +113,7 @@ def as_frf_set(content: FrfArrays, where: str, reading: Reading) -> FrfSet:
     """
     try:
         freq_hz = _frequencies(content.freq_hz) * _hertz(content, reading)
-        responses, excitations = _channels(content)
+        responses, excitations = _channels(content, reading)
         shape = (freq_hz.size, len(responses), len(excitations))
         h = _in_order("FRFs", content.h, content.axes, shape).astype(np.complex128)
         used, factor = _quantity(content, (*responses, *excitations), reading)
@@ -126,11 +130,61 @@ def as_frf_set(content: FrfArrays, where: str, reading: Reading) -> FrfSet:
             h *= factor
         places = content.coordinates
         setups = None if content.setups is None else content.setups.times(factor)
-        found = FrfSet(freq_hz, responses, excitations, h, used, places, where, coherence, averages, stated, setups)
-        found.check_whole()
+        whole = FrfSet(freq_hz, responses, excitations, h, used, places, where, coherence, averages, stated, setups)
+        found, left_out = finite_frfs(whole)
     except (ValueError, TypeError, OverflowError) as error:
         raise FileContentError(f"{where}: {error}") from error
+    reading.notes.extend(f"{where}: {each}" for each in (*content.notes, *left_out) if each)
     return found
+
+
+def finite_frfs(frfs: FrfSet) -> tuple[FrfSet, list[str]]:
+    """Leave out a line at 0 Hz and FRFs that hold NaN or Inf.
+
+    Parameters
+    ----------
+    frfs : FrfSet
+
+    Returns
+    -------
+    FrfSet
+        Without the line at 0 Hz if an FRF is not finite there, as division by a spectrum of zero leaves it; without
+        the FRFs that are not finite on other lines.
+    list of str
+        What was left out, one sentence each.
+
+    Raises
+    ------
+    ValueError
+        No FRF is left, or the set has set-ups, whose numbers an FRF cannot leave.
+    """
+    if frfs.setups is not None:
+        frfs.check_whole()
+        return frfs, []
+    bad, notes = ~np.isfinite(frfs.h) & frfs.measured, []
+    if frfs.freq_hz[0] == 0.0 and bad[0].any():
+        if frfs.freq_hz.size == 1:
+            raise ValueError("it holds nothing but NaN or Inf at 0 Hz")
+        notes.append(f"the line at 0 Hz holds NaN or Inf in {_pairs(frfs, bad[0])} and is left out")
+        coherence = None if frfs.coherence is None else frfs.coherence[1:]
+        frfs, bad = replace(frfs, freq_hz=frfs.freq_hz[1:], h=frfs.h[1:], coherence=coherence), bad[1:]
+    is_out = bad.any(axis=0)
+    for i, j in np.argwhere(is_out):
+        held = bad[:, i, j]
+        notes.append(
+            f"FRF {frfs.responses[i]} / {frfs.excitations[j]} is left out: NaN or Inf on {held.sum()} of {held.size} "
+            f"lines, first at {frfs.freq_hz[held.argmax()]:g} Hz"
+        )
+    if is_out.any():
+        frfs = replace(frfs, h=np.where(is_out, np.nan, frfs.h))
+    if not frfs.measured.any():
+        raise ValueError(notes[-1] if notes else "there is no FRF")
+    return frfs, notes
+
+
+def _pairs(frfs: FrfSet, chosen: NDArray[np.bool_]) -> str:
+    names = [f"{frfs.responses[i]} / {frfs.excitations[j]}" for i, j in np.argwhere(chosen)]
+    return some_of(names, _SHOWN)
 
 
 def contradiction(said: str, wanted: str, where: str) -> str:
@@ -165,11 +219,16 @@ def _hertz(content: FrfArrays, reading: Reading) -> float:
     return 1.0 if factor is None else factor
 
 
-def _channels(content: FrfArrays) -> tuple[tuple[Channel, ...], tuple[Channel, ...]]:
-    for name in ("responses", "excitations"):
-        if getattr(content, name) is None:
-            raise ValueError(f"the {name} are not named: give them, such as 102:+y")
-    return channels_of("responses", content.responses), channels_of("excitations", content.excitations)
+def _channels(content: FrfArrays, reading: Reading) -> tuple[tuple[Channel, ...], tuple[Channel, ...]]:
+    sides = "responses", "excitations"
+    missing = [side for side in sides if getattr(content, side) is None]
+    if missing:
+        held = " x ".join(map(str, np.shape(content.h)))
+        ways = " and ".join(f"mapping {side}=..." for side in missing)
+        raise ValueError(f"the FRFs ({held}) have no names of {' and '.join(missing)}; give {ways}, such as 1:x,2:x")
+    namer = reading.mapping.namer
+    responses, excitations = (namer.channels(side, getattr(content, side)) for side in sides)
+    return responses, excitations
 
 
 def _in_order(what: str, values: Any, axes: str, shape: tuple[int, int, int]) -> NDArray[Any]:

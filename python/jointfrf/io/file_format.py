@@ -1,22 +1,23 @@
-"""What a format of files of FRFs consists of, and what a user says of the files that are read."""
+"""What a format of files of FRFs consists of, and what a user states about the files that are read."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.errors import FileContentWarning
+from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.files import ReadLimit
-from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, FrfSet
+from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
 from jointfrf.frf.setups import SetUps
+from jointfrf.io.labels import ChannelNamer
 from jointfrf.io.units import SAME_FACTOR, StatedUnits
-from jointfrf.kernel.arguments import as_nodes, check_type
+from jointfrf.kernel.arguments import as_nodes, check_type, one_line
 from jointfrf.spelling import did_you_mean
 
 __all__ = ["TIME_DATA", "FileFormat", "FrfArrays", "FrfMapping", "Reading"]
@@ -27,21 +28,32 @@ TIME_DATA = "estimate FRFs from the time data first, for example with pyFRF"
 
 @dataclass(frozen=True)
 class FrfMapping:
-    """Which field of a file is what; None: by the names that scripts use.
+    """Which field of a file is what; None: by the usual names.
 
     Parameters
     ----------
-    freq_hz, h, coherence, averages, quantity, unit : str, optional
-        Names of fields; inside structures or groups with points between, ``test.frf``.
+    freq_hz : str or array_like, optional
+        Field of the frequencies in Hz; or the frequencies; or first one and spacing, ``5:0.5``, each a number or the
+        name of a field.
+    h, coherence, averages, quantity, unit : str, optional
+        Names of fields; inside structures or groups with points between, ``test.frf``; of structure arrays with an
+        index from 1, or all by a colon, ``test(3).frf``, ``test(:).frf``.
+    real, imag, magnitude, phase_deg, phase_rad : str, optional
+        Names of fields with the parts of the FRFs, in place of `h`.
     responses, excitations : str or sequence of str, optional
-        The field that holds the names of the channels, or these names.
+        Field with the names of the channels, or these names. Of functions one by one: a name for each, in their order,
+        or one for all.
     response_nodes, response_directions, excitation_nodes, excitation_directions : str, optional
         Instead: fields of nodes, and of directions as names or codes 1 to 6; one value stands for all channels.
+    direction : str, optional
+        Direction of the channels that have none in the file.
+    components : str or mapping of str to int, optional
+        Number to add to the nodes of each component, ``frame:0,arm:1000``.
     axes : str, optional
-        Order of the axes: ``freq,out,in``, ``out,in,freq``, ...; by the sizes where they say it.
+        Order of the axes: ``freq,out,in``, ``out,in,freq``, ...; by default from the sizes.
     """
 
-    freq_hz: str | None = None
+    freq_hz: Any = None
     h: str | None = None
     responses: Any = None
     excitations: Any = None
@@ -49,16 +61,53 @@ class FrfMapping:
     response_directions: str | None = None
     excitation_nodes: str | None = None
     excitation_directions: str | None = None
+    direction: str | None = None
+    components: Any = None
     axes: str | None = None
     quantity: str | None = None
     unit: str | None = None
     coherence: str | None = None
     averages: str | None = None
+    real: str | None = None
+    imag: str | None = None
+    magnitude: str | None = None
+    phase_deg: str | None = None
+    phase_rad: str | None = None
+
+    @property
+    def names_frfs(self) -> bool:
+        """Whether the user names the field of the FRFs, or fields of their parts."""
+        own = (self.h, self.real, self.imag, self.magnitude, self.phase_deg, self.phase_rad)
+        return any(each is not None for each in own)
+
+    @property
+    def namer(self) -> ChannelNamer:
+        """What makes channels of the names in one file."""
+        return ChannelNamer(self.direction, self.components)
+
+    def names_of(self, side: str, count: int, where: str) -> list[Any] | None:
+        """Return the names that the user lists of a side of functions one by one; None where there are none.
+
+        Raises
+        ------
+        FileContentError
+            There is neither a name for each function nor one for all.
+        """
+        given = getattr(self, side)
+        if given is None or not count:
+            return None
+        names = [each.strip() for each in given.split(",")] if isinstance(given, str) else list(given)
+        if len(names) not in (1, count):
+            raise FileContentError(
+                f"{where} holds {count} functions of a kind, and mapping {side}= has {len(names)} names; give one name "
+                "for each, in their order, or one for all"
+            )
+        return names * count if len(names) == 1 else names
 
 
 @dataclass(frozen=True)
 class Reading:
-    """What the user says of files, and what the user is warned of.
+    """What the user states about files, and warnings for the user.
 
     Attributes
     ----------
@@ -109,7 +158,7 @@ class Reading:
             One is wrong.
         """
         if quantity is not None and quantity not in POWER_OF_I_OMEGA:
-            raise ValueError(f"quantity {quantity!r} is none of {', '.join(POWER_OF_I_OMEGA)}")
+            raise ValueError(f"unknown quantity {one_line(quantity)}; use one of {', '.join(POWER_OF_I_OMEGA)}")
         wanted = None if nodes is None else frozenset(as_nodes("nodes", nodes))
         check_type("unit", unit, str)
         check_type("skip_lines", skip_lines, int)
@@ -168,21 +217,43 @@ class Reading:
 
 
 def _as_mapping(given: Mapping[str, Any] | FrfMapping | None) -> FrfMapping:
-    if isinstance(given, FrfMapping):
-        return given
-    if not isinstance(given, Mapping | None):
+    if not isinstance(given, Mapping | FrfMapping | None):
         raise TypeError(f"mapping must be a mapping or an FrfMapping, not {type(given).__name__}")
-    names = [each.name for each in fields(FrfMapping)]
-    for name in given or {}:
-        if name not in names:
-            hint = did_you_mean(str(name), names)
-            raise ValueError(f"mapping names {name!r}, which is none of {', '.join(names)}{hint}")
-    return FrfMapping(**(given or {}))
+    if not isinstance(given, FrfMapping):
+        names = [each.name for each in fields(FrfMapping)]
+        for name in given or {}:
+            if name not in names:
+                hint = did_you_mean(str(name), names)
+                raise ValueError(f"unknown field {one_line(name)} in mapping; use one of {', '.join(names)}{hint}")
+        given = FrfMapping(**(given or {}))
+    direction = None if given.direction is None else _direction(given.direction)
+    return replace(given, direction=direction, components=_components(given.components))
+
+
+def _direction(given: Any) -> str:
+    try:
+        return Channel(1, given).direction
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{error}; correct mapping direction=") from error
+
+
+def _components(given: Any) -> dict[str, int] | None:
+    """Return what is added to the nodes of each component."""
+    if given is None:
+        return None
+    pairs = given.items() if isinstance(given, Mapping) else [each.rpartition(":")[::2] for each in given.split(",")]
+    try:
+        found = {str(name).strip(): int(number) for name, number in pairs}
+    except (ValueError, TypeError):
+        found = {}
+    if not found or min(found.values()) < 0 or "" in found:
+        raise ValueError(f"mapping components={one_line(given)} is not like components=frame:0,arm:1000")
+    return found
 
 
 @dataclass
 class FrfArrays:
-    """The content of a file, in its own units and order."""
+    """The content of a file, in its own units and order, with notes of what is not read or used."""
 
     freq_hz: Any
     h: Any
@@ -195,6 +266,7 @@ class FrfArrays:
     averages: Any = None
     coordinates: Mapping[int, NDArray[np.float64]] = field(default_factory=dict)
     setups: SetUps | None = None
+    notes: list[str] = field(default_factory=list)
     frequency_unit: str = ""  #: Hz by default
     takes: Collection[str] | None = None  #: as of `FileFormat`
 

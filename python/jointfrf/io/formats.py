@@ -155,11 +155,9 @@ def read_frfs(
     nodes : collection of int, optional
         Only FRFs between these nodes.
     mapping : mapping, optional
-        Which field of a MATLAB, NPZ or HDF5 file is what, where it has other names than the usual ones: keys
-        ``freq_hz``, ``h``, ``responses``, ``excitations``, ``quantity``, ``unit``, ``coherence``, ``averages`` (names
-        of fields, ``test.frf`` inside a structure; channels also as their names), ``axes`` (``out,in,freq``). Instead
-        of names of channels ``response_nodes`` and ``response_directions`` (``x``, ``-rz``; or codes 1 to 6), and
-        ``excitation_nodes`` and ``excitation_directions``.
+        Which field of a MATLAB, NPZ or HDF5 file is what, if it has other names than the usual ones, and what a file of
+        any format lacks, as in `FrfMapping`: ``{"h": "test.frf", "axes": "out,in,freq"}``, ``{"direction": "z"}``,
+        ``{"components": "frame:0,arm:1000"}``, ``{"responses": "101:z,201:z", "excitations": "101:z"}``.
     averages : number or array_like, shape (n_responses, n_excitations), optional
         Number of averages, where the files do not say it.
     limit_gb : float, optional

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -13,13 +14,27 @@ from jointfrf.files import ReadLimit
 from jointfrf.frf.frf_set import Channel
 from jointfrf.frf.merge import same_lines
 from jointfrf.io.file_format import FrfArrays, FrfMapping
-from jointfrf.io.labels import channels_of
+from jointfrf.io.labels import ChannelNamer
 from jointfrf.io.units import SAME_FACTOR, parse_frequency_unit, parse_unit, si_label
+from jointfrf.spelling import some_of
 
-__all__ = ["LooseFunction", "arrays_of_functions", "functions_of_sdynpy", "functions_of_testlab"]
+__all__ = [
+    "LooseFunction",
+    "arrays_of_functions",
+    "difference_of",
+    "functions_of_sdynpy",
+    "functions_of_testlab",
+    "repetition_note",
+]
 
 #: The function type of FRFs in sdynpy, as in Universal Files.
 _FRF = 4
+#: Beginnings of the types of FRFs, and types of ordinary coherence, in Testlab: letters and digits in lower case.
+_FRF_TYPES = ("frf", "frequencyresponse", "h1", "h2", "hv", "transferfunction", "inertance", "accelerance", "mobility",
+              "receptance")  # fmt: skip
+_COHERENCE_TYPES = ("coherence", "ordinarycoherence", "coherencefunction")
+#: Types of functions that a message names.
+_SHOWN = 5
 
 
 class LooseFunction(NamedTuple):
@@ -41,11 +56,16 @@ class LooseFunction(NamedTuple):
 def arrays_of_functions(functions: Sequence[LooseFunction], where: str, limit: ReadLimit) -> FrfArrays:
     """Put functions into matrices.
 
+    Returns
+    -------
+    FrfArrays
+        Of several FRFs between the same channels the first; a note states how far the others differ from it.
+
     Raises
     ------
     FileContentError
-        There is no FRF; functions differ in frequency lines, units or quantities; one occurs twice; the matrix of
-        all channels is beyond the limit.
+        There is no FRF; functions differ in frequency lines, units or quantities; the matrix of all channels is
+        beyond the limit.
     """
     frfs = [each for each in functions if not each.is_coherence]
     if not frfs:
@@ -59,30 +79,51 @@ def arrays_of_functions(functions: Sequence[LooseFunction], where: str, limit: R
     limit.take(3 * 8 * shape[0] * shape[1] * shape[2])
     h, coherence = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
     seen: set[tuple[Channel, Channel, bool]] = set()
+    again: list[tuple[float, str]] = []
     for each in functions:
         if each.values.shape != each.freq_hz.shape:
             raise FileContentError(f"{where}: {each} has {each.values.size} values at {each.freq_hz.size} lines")
         if not same_lines(each.freq_hz, first.freq_hz):
             raise FileContentError(f"{where}: {first} and {each} have different frequency lines")
-        if (*each[:2], each.is_coherence) in seen:
-            raise FileContentError(f"{where} holds {each} twice")
+        is_first = (*each[:2], each.is_coherence) not in seen
         seen.add((*each[:2], each.is_coherence))
         if each.is_coherence:
-            if each.response in row_of and each.excitation in column_of:
+            if is_first and each.response in row_of and each.excitation in column_of:
                 coherence[:, row_of[each.response], column_of[each.excitation]] = each.values
             continue
         if each[5:] != first[5:]:
             said = [f"{one.quantity} [{one.unit or 'no unit'}]".strip() for one in (first, each)]
-            raise FileContentError(f"{where}: {first} is {said[0]}, {each} is {said[1]}: they must be alike")
-        h[:, row_of[each.response], column_of[each.excitation]] = each.values
+            raise FileContentError(f"{where}: {first} is {said[0]}, {each} is {said[1]}; export them alike")
+        place = (slice(None), row_of[each.response], column_of[each.excitation])
+        if is_first:
+            h[place] = each.values
+        else:
+            again.append((difference_of(h[place], np.asarray(each.values, np.complex128)), str(each)))
     known = None if np.isnan(coherence).all() else coherence
+    notes = [repetition_note(*max(again), len(again))] if again else []
     return FrfArrays(
-        first.freq_hz, h, "freq,out,in", responses, excitations, first.quantity, first.unit, known,
+        first.freq_hz, h, "freq,out,in", responses, excitations, first.quantity, first.unit, known, notes=notes,
         frequency_unit=first.frequency_unit,
     )  # fmt: skip
 
 
-def functions_of_sdynpy(data: Any, function_type: Any, where: str) -> list[LooseFunction]:
+def difference_of(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> float:
+    """Return how far another FRF between the same channels differs from one: median over the lines, relative to it."""
+    size = abs(one)
+    with np.errstate(invalid="ignore", over="ignore"):
+        apart = abs(one - other)[size > 0] / size[size > 0]
+    known = apart[np.isfinite(apart)]
+    return float(np.median(known)) if known.any() else 0.0
+
+
+def repetition_note(share: float, which: str, count: int) -> str:
+    """State that further FRFs between the same channels are left out, and the largest difference from the first."""
+    apart = f"they differ by up to {100 * share:.2g} % ({which})" if share else "their values are the same"
+    plural = "s" if count > 1 else ""
+    return f"{count} further FRF{plural} between the same channels left out, the first is used; {apart}"
+
+
+def functions_of_sdynpy(data: Any, function_type: Any, mapping: FrfMapping, where: str) -> list[LooseFunction]:
     """Return the functions of a structured array of sdynpy (`NDDataArray.save`); none where it is another array.
 
     Raises
@@ -93,12 +134,12 @@ def functions_of_sdynpy(data: Any, function_type: Any, where: str) -> list[Loose
     if not (isinstance(data, np.ndarray) and set(data.dtype.names or ()) >= {"abscissa", "ordinate", "coordinate"}):
         return []
     if function_type != _FRF:
-        raise FileContentError(f"{where} holds functions of type {function_type} of sdynpy, not FRFs (type {_FRF})")
-    found = []
+        raise FileContentError(f"{where} holds functions of type {function_type} of sdynpy; save FRFs (type {_FRF})")
+    found, namer = [], mapping.namer
     for row in data.ravel():
         try:
             places = [(each["node"], each["direction"]) for each in np.ravel(row["coordinate"])]
-            channels = [channels_of("coordinates", [place])[0] for place in places]
+            channels = [namer.channel("coordinates", place) for place in places]
         except (ValueError, TypeError) as error:
             raise FileContentError(f"{where} {error}") from error
         if len(channels) != 2:
@@ -107,16 +148,71 @@ def functions_of_sdynpy(data: Any, function_type: Any, where: str) -> list[Loose
     return found
 
 
-def functions_of_testlab(fields: Any, mapping: FrfMapping, where: str) -> list[LooseFunction] | None:
-    """Return the FRFs and coherences of all structures that Simcenter Testlab exports; None without such a structure.
+class _Column(NamedTuple):
+    """One function of a structure of Testlab: lines, values, unit, and the names of its channels if there are any."""
+
+    freq_hz: NDArray[np.float64]
+    values: NDArray[Any]
+    is_coherence: bool
+    unit: str
+    response: str | None
+    excitation: str | None
+    frequency_unit: str
+
+
+def functions_of_testlab(fields: Any, mapping: FrfMapping, where: str) -> tuple[list[LooseFunction], list[str]] | None:
+    """Return the FRFs and coherences of all structures that Simcenter Testlab exports, with notes of what is not read.
+
+    Returns
+    -------
+    list of LooseFunction, list of str; or None
+        None without such a structure.
 
     Raises
     ------
     FileContentError
-        A structure is damaged or does not name its channels.
+        A structure is damaged or does not name its channels, or there is no FRF.
     """
-    records = list(_records(fields))
-    return [each for record in records for each in _functions(record, mapping, where)] if records else None
+    columns: list[_Column] = []
+    others: Counter[str] = Counter()
+    is_export = False
+    for record in _records(fields):
+        is_export = True
+        columns += _columns(record, where, others)
+    if not is_export:
+        return None
+    left_out = some_of([f"{count} of type {name}" for name, count in others.items()], _SHOWN)
+    frfs = [each for each in columns if not each.is_coherence]
+    if not frfs:
+        raise FileContentError(f"{where} holds no FRF, but functions ({left_out or 'coherences'}); export FRFs")
+    coherences = [each for each in columns if each.is_coherence]
+    namer = mapping.namer
+    found = [each for own in (frfs, coherences) for each in _named(own, mapping, namer, where)]
+    return found, [f"not read, no FRF: functions ({left_out})"] if others else []
+
+
+def _named(columns: Sequence[_Column], mapping: FrfMapping, namer: ChannelNamer, where: str) -> Iterator[LooseFunction]:
+    """Return functions of one kind with their channels, named by the user in their order, or else by the file."""
+    sides = []
+    for side, key, own in (
+        ("responses", "primary_channel", [each.response for each in columns]),
+        ("excitations", "reference_channel", [each.excitation for each in columns]),
+    ):
+        labels = mapping.names_of(side, len(columns), where) or own
+        if None in labels:
+            raise FileContentError(
+                f"{where} does not name the {side} of its functions ({key}); give mapping {side}=..., one name for "
+                f"each of {len(columns)}, or one for all"
+            )
+        try:
+            sides.append([namer.channel(side, label) for label in labels])
+        except ValueError as error:
+            raise FileContentError(f"{where} {error}") from error
+    for response, excitation, each in zip(*sides, columns, strict=True):
+        yield LooseFunction(
+            response, excitation, each.freq_hz, each.values, each.is_coherence, each.unit,
+            frequency_unit=each.frequency_unit,
+        )  # fmt: skip
 
 
 def _records(content: Any) -> Iterator[Mapping[str, Any]]:
@@ -132,26 +228,57 @@ def _records(content: Any) -> Iterator[Mapping[str, Any]]:
             yield from _records(value)
 
 
-def _functions(record: Mapping[str, Any], mapping: FrfMapping, where: str) -> Iterator[LooseFunction]:
-    """FRFs and coherences of one structure, which holds a column for each."""
+def _columns(record: Mapping[str, Any], where: str, others: Counter[str]) -> Iterator[_Column]:
+    """FRFs and coherences of one structure, which holds a column for each; other functions are counted."""
     about = record.get("function_record")
-    about = about if isinstance(about, Mapping) else {}
-    kind = " ".join(_texts(about.get("type"))).lower()
-    is_coherence = "coherence" in kind
+    about = about if isinstance(about, Mapping | list) else {}
+    types = [each.get("type") for each in about] if isinstance(about, list) else _texts(about.get("type"))
+    kinds = [_kind(" ".join(_texts(each))) for each in types] or [""]
+    read = ("frf", "coherence", "")
+    if not set(kinds) & set(read):
+        others.update(kinds)
+        return
     x_values, y_values = _part(record, "x_values", where), _part(record, "y_values", where)
     values = np.asarray(_needed(y_values, "values", where))
+    if "" in kinds and values.dtype.kind != "c":  # no type: a spectrum or a time history of the same export
+        others["none"] += 1
+        return
     freq_hz = _lines(x_values, values, where)
     columns = values.reshape(freq_hz.size, -1)
     if values.ndim == 2 and values.shape[0] != freq_hz.size:
         columns = values.T
-    if not (is_coherence or columns.dtype.kind == "c"):
-        return  # spectra and time histories of the same export
-    unit = "" if is_coherence else _unit(y_values)
-    pairs = _pairs(about, columns.shape[1], mapping, where)
-    for (response, excitation), column in zip(pairs, columns.T, strict=True):
-        yield LooseFunction(
-            response, excitation, freq_hz, column, is_coherence, unit, frequency_unit=_frequency_unit(x_values)
-        )
+    n = columns.shape[1]
+    if len(kinds) not in (1, n):
+        raise FileContentError(f"{where} is damaged: {len(kinds)} types of {n} functions")
+    names = [_channel_names(about, key, n) for key in ("primary_channel", "reference_channel")]
+    unit = ""
+    for i, kind in enumerate(kinds * n if len(kinds) == 1 else kinds):
+        if kind not in read:
+            others[kind] += 1
+            continue
+        if kind != "coherence" and not unit:
+            unit = _unit(y_values)
+        labels = (None if own is None else own[i] for own in names)
+        is_coherence = kind == "coherence"
+        own_unit = "" if is_coherence else unit
+        yield _Column(freq_hz, columns[:, i], is_coherence, own_unit, *labels, _frequency_unit(x_values))
+
+
+def _kind(name: str) -> str:
+    """Return ``frf``, ``coherence``, or the type of a function as the file has it; no text if it has none."""
+    letters = "".join(filter(str.isalnum, name.lower()))
+    if letters.startswith(_FRF_TYPES):
+        return "frf"
+    return "coherence" if letters in _COHERENCE_TYPES else name.strip()
+
+
+def _channel_names(about: Any, key: str, n: int) -> list[str] | None:
+    """Return the names of the channels of n functions."""
+    if isinstance(about, list):
+        each_of = [_point_names(each.get(key), 1) for each in about]
+        return None if None in each_of or len(each_of) != n else [own[0] for own in each_of if own]
+    names = _point_names(about.get(key), n)
+    return names * n if names is not None and len(names) == 1 else names if names and len(names) == n else None
 
 
 def _part(record: Mapping[str, Any], name: str, where: str) -> Mapping[str, Any]:
@@ -217,27 +344,6 @@ def _axis(values: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
     quantity = values.get("quantity")
     quantity = quantity if isinstance(quantity, Mapping) else {}
     return quantity, (_texts(quantity.get("label")) or [""])[0].replace("\0", " ").strip()
-
-
-def _pairs(about: Mapping[str, Any], n: int, mapping: FrfMapping, where: str) -> list[tuple[Channel, Channel]]:
-    """Response and excitation of each column."""
-    sides = []
-    for what, given, key in (
-        ("responses", mapping.responses, "primary_channel"),
-        ("excitations", mapping.excitations, "reference_channel"),
-    ):
-        labels = given if given is not None else _point_names(about.get(key), n)
-        labels = labels.split(",") if isinstance(labels, str) else labels
-        if labels is None or len(labels) not in (1, n):
-            raise FileContentError(
-                f"{where} does not name the {what} of its functions ({key}): say {what}= by mapping, such as 102:+y"
-            )
-        try:
-            channels = [channels_of(what, [label])[0] for label in labels]
-        except ValueError as error:
-            raise FileContentError(f"{where} {error}; say {what}= by mapping") from error
-        sides.append(channels * n if len(channels) == 1 else channels)
-    return list(zip(*sides, strict=True))
 
 
 def _point_names(channel: Any, n: int) -> list[str] | None:

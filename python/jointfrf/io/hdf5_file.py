@@ -38,7 +38,7 @@ _NOWHERE = 2**64 - 1
 
 
 def hdf5_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
-    """Read all datasets; groups are mappings inside.
+    """Read all datasets; groups are mappings inside, structure arrays of MATLAB lists of them.
 
     Parameters
     ----------
@@ -61,7 +61,8 @@ def hdf5_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
     """
     h5py = import_extra("h5py")
     with damage_named(path, "an HDF5 file", zlib.error), h5py.File(path, "r") as file:
-        return _Hdf5(h5py, path, limit).group(file, 0)
+        found: dict[str, Any] = _Hdf5(h5py, path, limit).group(file, 0)
+        return found
 
 
 class _Hdf5:
@@ -74,12 +75,18 @@ class _Hdf5:
     def elsewhere(self, name: str) -> FileContentError:
         return FileContentError(f"{self.path} takes {name!r} from another file, which is not read: copy it there")
 
-    def group(self, group: Any, depth: int) -> dict[str, Any]:
+    def group(self, group: Any, depth: int) -> Any:
+        """Return the members of a group; those of a structure array of MATLAB as a list of structures."""
         if depth > _DEEPEST:
             raise FileContentError(f"{self.path} has groups inside groups without end")
-        return {
-            name: self.value(self.opened(group, name), depth) for name in group if not name.startswith("#")
-        }  # fmt: skip
+        items = {name: self.opened(group, name) for name in group if not name.startswith("#")}
+        found = {name: self.value(item, depth) for name, item in items.items()}
+        lengths = {len(value) if isinstance(value, list) else -1 for value in found.values()}
+        if self.matlab(group, "MATLAB_class") != "struct" or len(lengths) != 1 or min(lengths) < 1:
+            return found
+        if any(self.matlab(item, "MATLAB_class") for item in items.values()):  # cells
+            return found
+        return [dict(zip(found, values, strict=True)) for values in zip(*found.values(), strict=True)]
 
     def opened(self, group: Any, name: str, links: int = 0) -> Any:
         """Return what a link leads to, inside the file."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import fields as dataclass_fields
-from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,11 @@ from numpy.typing import NDArray
 
 from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit
-from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, FrfSet
+from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, ROUND_OFF, Channel, FrfSet
 from jointfrf.frf.setups import SetUps
 from jointfrf.io.file_format import TIME_DATA, FrfArrays, FrfMapping
-from jointfrf.io.functions import arrays_of_functions, functions_of_sdynpy, functions_of_testlab
-from jointfrf.kernel.arguments import as_array, check_type
+from jointfrf.io.functions import LooseFunction, arrays_of_functions, functions_of_sdynpy, functions_of_testlab
+from jointfrf.kernel.arguments import as_array, check_type, one_line
 from jointfrf.spelling import some_of
 
 __all__ = ["arrays_of_fields", "fields_of"]
@@ -31,6 +32,9 @@ _CHECKSUM = "sha256"
 #: Fields of every file in the own layout; units by how often a receptance is differentiated.
 _REQUIRED = ("freq_hz", "h", "responses", "excitations", "quantity")
 _UNITS = ("m/N", "m/s/N", "m/s^2/N")
+#: All fields of the own layout.
+_FIELDS = (_MARK, *_REQUIRED, "unit", "coherence", "averages", "nodes", "coordinates", "setups", "setup_of",
+           "setup_gains", "setup_repeats", "setup_repeated", _CHECKSUM)  # fmt: skip
 
 
 #: Names, in lower case, that are taken for a field where the user names none.
@@ -55,6 +59,12 @@ _KNOWN = {
 _TAKEN_BY_SDYNPY = ("direction", "components")
 _TAKEN_BY_TESTLAB = ("responses", "excitations", *_TAKEN_BY_SDYNPY)
 _TAKEN_BY_ARRAYS = (*(each.name for each in dataclass_fields(FrfMapping)), "frequency")
+#: Fields with parts of FRFs, by which the user may name these.
+_PARTS = ("real", "imag", "magnitude", "phase_deg", "phase_rad")
+#: Frequencies that the user gives: a list of numbers, or first one and spacing.
+_LITERAL = re.compile(r"[,:]|^[0-9.]+$")
+#: Fields that a message names, and characters of each.
+_SHOWN, _NAME = 12, 30
 #: Names of FRFs that say their quantity, and of frequencies in rad/s.
 _QUANTITIES = ("accelerance", "inertance", "mobility", "receptance")
 _RADIANS = ("omega", "w")
@@ -86,12 +96,16 @@ def arrays_of_fields(
     """
     if keeps_shapes and (_MARK in fields or _CHECKSUM in fields):
         return _own_arrays(fields, where)
-    functions = functions_of_sdynpy(fields.get("data"), fields.get("function_type"), where)
-    exported = functions_of_testlab(fields, mapping, where) if mapping.h is None else None
-    if functions or exported is not None:
-        found = arrays_of_functions(functions or exported or [], where, limit)
-        return replace(found, takes=_TAKEN_BY_TESTLAB if exported is not None else _TAKEN_BY_SDYNPY)
-    return _mapped_arrays(fields, mapping, where)
+    functions, notes = functions_of_sdynpy(fields.get("data"), fields.get("function_type"), mapping, where), list[str]()
+    exported = None if mapping.names_frfs else functions_of_testlab(fields, mapping, where)
+    if exported is not None:
+        functions, notes = exported
+    if functions:
+        found = arrays_of_functions(functions, where, limit)
+        found.notes[:0] = notes
+        found.takes = _TAKEN_BY_SDYNPY if exported is None else _TAKEN_BY_TESTLAB
+        return found
+    return _mapped_arrays(fields, mapping, where, limit)
 
 
 def fields_of(frfs: FrfSet) -> dict[str, NDArray[Any]]:
@@ -164,11 +178,19 @@ def _checksum(fields: Mapping[str, Any]) -> str:
     for name in sorted(fields):
         if name == _CHECKSUM:
             continue
+        if not _is_array(fields[name]):  # added by someone else
+            found.update(name.encode())
+            continue
         value = np.asarray(fields[name])
         is_text = value.dtype.kind in "US"
         content = "\n".join(map(str, value.ravel().tolist())).encode() if is_text else _values(value).tobytes()
         found.update(f"{name} {value.shape} ".encode() + content)
     return found.hexdigest()
+
+
+def _is_array(value: Any) -> bool:
+    """Whether a value holds numbers or texts: no group, no list of groups or cells."""
+    return np.asarray(value).dtype.kind in "biufcSU"
 
 
 def _values(value: NDArray[Any]) -> NDArray[Any]:
@@ -180,6 +202,10 @@ def _own_arrays(fields: Mapping[str, Any], where: str) -> FrfArrays:
     """FRFs of a file in the own layout."""
     if _MARK not in fields:
         raise FileContentError(f"{where} lacks {_MARK}")
+    wrong = next((name for name in _FIELDS if not _is_array(fields.get(name, 0))), None)
+    if wrong is not None:
+        what = "a group" if isinstance(fields[wrong], Mapping) else "neither numbers nor texts"
+        raise FileContentError(f"{where} is damaged: {wrong} is {what}, not an array; write the file again")
     layout = np.asarray(fields[_MARK])
     if layout.size != 1 or layout.dtype.kind not in "iu" or int(layout.item()) not in (_LAYOUT, _UNCHECKED):
         raise FileContentError(
@@ -213,40 +239,155 @@ def _own_arrays(fields: Mapping[str, Any], where: str) -> FrfArrays:
     )
 
 
-def _mapped_arrays(content: Mapping[str, Any], mapping: FrfMapping, where: str) -> FrfArrays:
+def _mapped_arrays(content: Mapping[str, Any], mapping: FrfMapping, where: str, limit: ReadLimit) -> FrfArrays:
     """FRFs by the names of fields."""
     flat = dict(_flattened(content))
     found = {name: _field(flat, name, getattr(mapping, name), where) for name in _KNOWN}
-    freq, h = found["freq_hz"], found["h"]
-    for each, name, what in ((freq, "freq_hz", "frequencies"), (h, "h", "FRFs")):
-        if each is None:
-            known = ", ".join(_KNOWN[name])
-            times = [each for each in flat if each.rpartition(".")[2].lower() in _TIMES]
-            if h is None and times:
-                raise FileContentError(f"{where} has times ({times[0]}) and no FRFs ({known}); {TIME_DATA}")
-            raise FileContentError(
-                f"{where} has no field for the {what} ({known}): say which of {_names(flat)} by mapping"
-            )
-    assert freq is not None
-    assert h is not None
-    path, values = freq
-    name = path.rpartition(".")[2].lower()
-    frequency_unit = "rad/s" if name in _RADIANS else "Hz" if "hz" in name else ""
-    quantity = _text(found["quantity"])
-    last = h[0].rpartition(".")[2].lower()
-    return FrfArrays(
-        np.asarray(values),
-        h[1],
+    times = [path for path in flat if path.rpartition(".")[2].lower() in _TIMES]
+    if times and found["h"] is None and not mapping.names_frfs:
+        raise FileContentError(f"{where} has times ({times[0]}) and no FRFs; {TIME_DATA}")
+    if found["freq_hz"] is None:
+        raise FileContentError(
+            f"{where} has no field for the frequencies; give mapping freq_hz=..., a field out of {_names(flat)}, or "
+            "first one and spacing, 5:0.5"
+        )
+    path, h = _frfs(found, flat, mapping, where)
+    responses, excitations = (_channels(found, what, where) for what in ("response", "excitation"))
+    quantity, last = _text(found["quantity"]), path.rpartition(".")[2].lower()
+    arrays = FrfArrays(
+        None,
+        h,
         mapping.axes or "",
-        _channels(found, "response", where),
-        _channels(found, "excitation", where),
+        responses,
+        excitations,
         quantity or (last if last in _QUANTITIES else ""),
         _text(found["unit"]),
         _value(found["coherence"]),
         _value(found["averages"]),
-        frequency_unit=frequency_unit,
+        frequency_unit=_frequency_unit(found["freq_hz"][0]),
         takes=_TAKEN_BY_ARRAYS,
     )
+    number = _number_of_functions(arrays)
+    arrays.freq_hz = _frequencies(found["freq_hz"], flat, arrays, number, where)
+    if number is None:
+        return arrays
+    found_one_by_one = _one_by_one(arrays, mapping, number, where, limit)
+    found_one_by_one.takes = _TAKEN_BY_ARRAYS
+    return found_one_by_one
+
+
+def _frequency_unit(path: str) -> str:
+    """Return the unit that the name of a field of frequencies states; empty: Hz, unless the user states another."""
+    name = path.rpartition(".")[2].lower()
+    return "rad/s" if name in _RADIANS else "Hz" if "hz" in name else ""
+
+
+def _frfs(
+    found: Mapping[str, tuple[str, Any] | None], flat: Mapping[str, Any], mapping: FrfMapping, where: str
+) -> tuple[str, Any]:
+    """Path and values of the FRFs: complex, or made of two fields with their parts."""
+    parts = [name for name in _PARTS if getattr(mapping, name) is not None]
+    if not parts:
+        if found["h"] is None:
+            raise FileContentError(f"{where} has no field for the FRFs; give mapping h=... out of {_names(flat)}")
+        return found["h"]
+    if set(parts) not in ({"real", "imag"}, {"magnitude", "phase_deg"}, {"magnitude", "phase_rad"}):
+        raise FileContentError(
+            f"{where}: mapping names {' and '.join(parts)} of the FRFs; give real= and imag=, or magnitude= and "
+            "phase_deg= or phase_rad="
+        )
+    values = []
+    for name in parts:
+        path, value = _field(flat, name, getattr(mapping, name), where) or ("", None)
+        array = np.asarray(value)
+        if array.dtype.kind not in "biuf":
+            raise FileContentError(f"{where}: {path} holds no real numbers, which mapping {name}= takes")
+        values.append(array.astype(np.float64))
+    one, other = values
+    if one.shape != other.shape:
+        raise FileContentError(f"{where}: {' and '.join(parts)} have the shapes {one.shape} and {other.shape}")
+    if parts[0] == "real":
+        return "", one + 1j * other
+    if one.min(initial=0.0) < 0.0:
+        raise FileContentError(f"{where}: magnitudes are negative, {one.min():g}; give linear values, not dB")
+    return "", one * np.exp(1j * (np.deg2rad(other) if parts[1] == "phase_deg" else other))
+
+
+def _number_of_functions(arrays: FrfArrays) -> int | None:
+    """Return how many FRFs stand one by one, each with its own response and excitation; None if they are a matrix."""
+    count, shape = _count(arrays.responses), [n for n in np.shape(arrays.h) if n != 1]
+    is_list = count == _count(arrays.excitations) and len(shape) == 2 and count in shape and not arrays.axes
+    return count if is_list else None
+
+
+def _count(labels: Any) -> int | None:
+    return None if labels is None else 1 if isinstance(labels, str) else len(labels)
+
+
+def _one_by_one(arrays: FrfArrays, mapping: FrfMapping, number: int, where: str, limit: ReadLimit) -> FrfArrays:
+    """Put functions, each with a response and an excitation of its own, into a matrix."""
+    n, namer, kinds = np.size(arrays.freq_hz), mapping.namer, [(False, arrays.h)]
+    kinds += [] if arrays.coherence is None else [(True, arrays.coherence)]
+    functions = []
+    for is_coherence, values in kinds:
+        array = np.squeeze(np.asarray(values))
+        if sorted(array.shape) != sorted((n, number)):
+            raise FileContentError(f"{where}: {number} functions at {n} lines have the sizes {array.shape}")
+        columns = array.T if array.shape == (n, number) else array
+        try:
+            functions += [
+                LooseFunction(
+                    namer.channel("responses", response),
+                    namer.channel("excitations", excitation),
+                    np.ravel(arrays.freq_hz),
+                    column,
+                    is_coherence,
+                    arrays.unit,
+                    arrays.quantity,
+                    arrays.frequency_unit,
+                )
+                for response, excitation, column in zip(arrays.responses, arrays.excitations, columns, strict=True)
+            ]
+        except ValueError as error:
+            raise FileContentError(f"{where} {error}") from error
+    return arrays_of_functions(functions, where, limit)
+
+
+def _frequencies(
+    found: tuple[str, Any], flat: Mapping[str, Any], arrays: FrfArrays, number: int | None, where: str
+) -> Any:
+    """Frequencies, of a field in its own unit: those of a field, those that the user lists, or first and spacing."""
+    path, values = found
+    if path or not isinstance(values, str):
+        return np.asarray(values)
+    if ":" not in values:
+        return np.array([_one_number(word, flat, where) for word in values.split(",")])
+    start, step, *end = (_one_number(word, flat, where) for word in values.split(":"))
+    if not step > 0 or end[1:]:
+        raise FileContentError(
+            f"{where}: mapping freq_hz={values} is not like 5:0.5, first frequency and spacing in Hz"
+        )
+    n = np.size(arrays.h) / (number or (_count(arrays.responses) or 1) * (_count(arrays.excitations) or 1))
+    if end:
+        n = np.floor((end[0] - start) / step * (1 + ROUND_OFF)) + 1
+    if n != int(n) or not 0 < n <= np.size(arrays.h):
+        raise FileContentError(
+            f"{where}: {np.size(arrays.h)} values are no whole number of lines of the named channels; correct "
+            "mapping responses= and excitations="
+        )
+    return start + step * np.arange(int(n))
+
+
+def _one_number(word: str, flat: Mapping[str, Any], where: str) -> float:
+    """Return a number, or that of a field of this name."""
+    value = np.ravel(np.asarray(flat.get(word.strip(), word)))
+    try:
+        (number,) = value.astype(np.float64).tolist()
+    except (ValueError, TypeError) as error:
+        raise FileContentError(
+            f"{where}: {one_line(word)} in mapping freq_hz= is neither a number nor a field with one number"
+        ) from error
+    return float(number)
 
 
 def _channels(found: Mapping[str, tuple[str, Any] | None], what: str, where: str) -> Any:
@@ -255,10 +396,10 @@ def _channels(found: Mapping[str, tuple[str, Any] | None], what: str, where: str
     if apart == (None, None) or (found[f"{what}s"] is not None and None in apart):
         return _value(found[f"{what}s"])
     if found[f"{what}s"] is not None:
-        raise FileContentError(f"{where} has {what}s as names and as nodes and directions: leave one out of mapping")
+        raise FileContentError(f"{where} has {what}s as names and as nodes and directions; leave one out of mapping")
     if apart[0] is None or apart[1] is None:
         missing = f"{what}_{'nodes' if apart[0] is None else 'directions'}"
-        raise FileContentError(f"{where} has no field {missing}: say which one holds it by mapping")
+        raise FileContentError(f"{where} has no field {missing}; give mapping {missing}=...")
     nodes, directions = (np.ravel(np.asarray(each[1])) for each in apart if each is not None)
     if 1 not in (nodes.size, directions.size) and nodes.size != directions.size:
         raise FileContentError(f"{where} has {nodes.size} nodes of {what}s, but {directions.size} directions")
@@ -271,32 +412,69 @@ def _channels(found: Mapping[str, tuple[str, Any] | None], what: str, where: str
 
 
 def _flattened(content: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """Fields by their paths: structures by points, structure arrays by an index from 1."""
     for name, value in content.items():
         if isinstance(value, Mapping):
             yield from _flattened(value, f"{before}{name}.")
+        elif isinstance(value, list) and value and all(isinstance(each, Mapping) for each in value):
+            for number, each in enumerate(value, start=1):
+                yield from _flattened(each, f"{before}{name}({number}).")
         else:
             yield f"{before}{name}", value
 
 
 def _field(flat: Mapping[str, Any], name: str, given: Any, where: str) -> tuple[str, Any] | None:
-    """Path and value of a field: the one that the user names, else the only one of a known name."""
+    """Path and value of a field: the one that the user names, else the only one of a known name.
+
+    The path is empty if the user gives the value itself.
+    """
     if given is not None and not isinstance(given, str):
         return "", given
     if given is not None:
-        if given in flat:
-            return given, flat[given]
+        path = given if given in flat else given.replace("(1)", "")  # one structure is no array
+        if path in flat:
+            return path, flat[path]
+        if "(:)" in given:
+            return given, _of_all(flat, given, where)
         if name in ("responses", "excitations") and ("," in given or ":" in given):
             return "", [each.strip() for each in given.split(",")]
-        raise FileContentError(f"{where} has no field {given!r}; it has {_names(flat)}")
+        if name == "unit" or (name == "freq_hz" and _LITERAL.search(given)):
+            return "", given
+        if name.endswith("_nodes") and given.replace(",", "").isdecimal():
+            return "", [int(number) for number in given.split(",")]
+        if name.endswith("_directions") and _is_direction(given):
+            return "", given
+        inside = [path for path in flat if path.startswith((f"{given}.", f"{given}("))]
+        what = f"{given} is a group" if inside else f"it has no field {given!r}"
+        raise FileContentError(f"{where}: {what}; use one of {_names(inside or list(flat))}")
     found = [path for path in flat if path.rpartition(".")[2].lower() in _KNOWN[name]]
     if len(found) > 1:
-        raise FileContentError(f"{where} has several fields for {name}: say which of {', '.join(found)} by mapping")
+        raise FileContentError(f"{where} has several fields for {name}; give mapping {name}=... out of {_names(found)}")
     return (found[0], flat[found[0]]) if found else None
 
 
-def _names(flat: Mapping[str, Any]) -> str:
-    shown = [name if len(name) <= 30 else f"{name[:27]}..." for name in flat]
-    return some_of(shown, 12) or "nothing"
+def _is_direction(word: str) -> bool:
+    try:
+        return bool(Channel(1, word))
+    except ValueError:
+        return False
+
+
+def _of_all(flat: Mapping[str, Any], given: str, where: str) -> Any:
+    """Return the arrays of all structures of an array, the first axis counts these."""
+    before, _, behind = given.partition("(:)")
+    values: list[NDArray[Any]] = []
+    while (path := f"{before}({len(values) + 1}){behind}") in flat:
+        values.append(np.asarray(flat[path]))
+    if not values or any(each.shape != values[0].shape for each in values):
+        shown = some_of([" x ".join(map(str, each.shape)) for each in values], _SHOWN)
+        raise FileContentError(f"{where}: {given} names no arrays of one size ({shown or 'none'})")
+    return values[0].tolist() if values[0].dtype.kind == "U" and len(values) == 1 else np.stack(values)
+
+
+def _names(paths: Collection[str]) -> str:
+    shown = [name if len(name) <= _NAME else f"{name[: _NAME - 3]}..." for name in islice(paths, _SHOWN)]
+    return some_of(shown, _SHOWN) + (f" and {len(paths) - _SHOWN} more" if len(paths) > _SHOWN else "") or "nothing"
 
 
 def _value(found: tuple[str, Any] | None) -> Any:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Collection, Iterable
+import codecs
+from collections.abc import Collection, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from os import PathLike
@@ -17,9 +17,10 @@ from jointfrf.errors import FileContentError
 from jointfrf.files import HEAD, ReadLimit, head_of, write_file
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, ROUND_OFF, Channel, FrfSet, same_frf
 from jointfrf.frf.merge import same_lines
-from jointfrf.io.arrays import contradiction
+from jointfrf.io.arrays import contradiction, finite_frfs
 from jointfrf.io.file_format import TIME_DATA, FileFormat, Reading
-from jointfrf.io.labels import DIRECTION_CODES
+from jointfrf.io.functions import difference_of, repetition_note
+from jointfrf.io.labels import DIRECTION_CODES, ChannelNamer
 from jointfrf.io.uff_file import UniversalFile, name_some, node_coordinates
 from jointfrf.io.uff_function import (
     DELIMITER,
@@ -73,12 +74,27 @@ class _Frf:
 
 @dataclass
 class _Content:
-    """What the headers of the file say."""
+    """What the headers of the file state.
+
+    Attributes
+    ----------
+    frfs : list of _Frf
+        FRFs that are wanted and can be used.
+    coherences : list of (int, FunctionHeader, (Channel, Channel))
+        The same of coherences: dataset, header, response and reference.
+    functions : dict of int to list of int
+        Datasets by the type of their function.
+    unusable : dict of str to list of int
+        Datasets of FRFs that cannot be used, by the reason.
+    numbered : dict of int to set of int
+        Numbers that the nodes of the file have in the set; several if components number nodes alike.
+    """
 
     frfs: list[_Frf] = field(default_factory=list)
     coherences: list[tuple[int, FunctionHeader, tuple[Channel, Channel]]] = field(default_factory=list)
-    functions: Counter[int] = field(default_factory=Counter)
+    functions: dict[int, list[int]] = field(default_factory=dict)
     unusable: dict[str, list[int]] = field(default_factory=dict)
+    numbered: dict[int, set[int]] = field(default_factory=dict)
 
 
 class _UnusableFrfError(Exception):
@@ -160,29 +176,50 @@ def read_uff(
 
 def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfSet:
     """Read the FRFs of a file; where it is one of several, coherences alone are enough, and FRFs are then NaN."""
-    nodes = reading.nodes
     file = UniversalFile(path, reading)
-    content = _describe(file, nodes)
+    content = _describe(file, reading)
     only_coherence = reading.is_part and not content.frfs and not content.unusable and content.coherences
     if not content.frfs and not only_coherence:
-        raise _no_frf(file, content, nodes)
+        raise _no_frf(file, content, reading.nodes)
     for reason, numbers in content.unusable.items():
         file.note(f"FRF left out: {reason}", *numbers)
-    frfs = _unique(file, content.frfs)
-    pairs = [frf.channels for frf in frfs] or [channels for *_, channels in content.coherences]
+    for kind, numbers in content.functions.items():
+        if kind not in (_FRF, _COHERENCE):
+            file.note(f"not read, no FRF: {file.function_name(kind)}", *numbers)
+    first, again = _unique(content.frfs)
+    pairs = [frf.channels for frf in first] or [channels for *_, channels in content.coherences]
     matrix = _Matrix(pairs)
-    freq_hz, h, common = _values(file, frfs, matrix, limit)
+    freq_hz, h, common = _values(file, first, matrix, limit)
+    if freq_hz is not None and h is not None:
+        _note_repetitions(file, again, matrix, common, freq_hz, h)
     freq_hz, coherence = _coherence(file, content, matrix, freq_hz, limit)
     if h is None:
         limit.take(matrix.bytes(freq_hz.size))
         h = np.full((freq_hz.size, *matrix.shape), np.nan + 0j)
-    freq_hz, h, coherence = _without_bad_zero_line(file, frfs, matrix, freq_hz, h, coherence)
-    coordinates = node_coordinates(file, {channel.node for pair in pairs for channel in pair})
-    reading.notes.extend(file.notes())
-    stated = _some(frf.stated for frf in frfs)
-    return FrfSet(
+    coordinates = _coordinates(file, content, {channel.node for pair in pairs for channel in pair})
+    stated = _some(frf.stated for frf in first)
+    found = FrfSet(
         freq_hz, matrix.responses, matrix.excitations, h, common, coordinates, str(path), coherence, None, stated
     )
+    left_out: list[str] = []
+    if first:
+        try:
+            found, left_out = finite_frfs(found)
+        except ValueError as error:
+            raise file.error(f"holds no FRF that can be used: {error}") from error
+    reading.notes.extend([*file.notes(), *(f"{path}: {each}" for each in left_out)])
+    return found
+
+
+def _coordinates(file: UniversalFile, content: _Content, wanted: Collection[int]) -> dict[int, NDArray[np.float64]]:
+    """Coordinates of the nodes of the set; not of nodes that several components have, which datasets do not name."""
+    shared = [node for node, numbers in content.numbered.items() if len(numbers) > 1]
+    number_of = {node: next(iter(numbers)) for node, numbers in content.numbered.items() if len(numbers) == 1}
+    nodes = [node for node, number in number_of.items() if number in wanted]
+    places = node_coordinates(file, nodes)
+    if shared and file.datasets(15, 2411):
+        file.note(f"coordinates of {name_some('node', shared)} are left out: several components have these numbers")
+    return {number_of[node]: place for node, place in places.items()}
 
 
 class _Matrix:
@@ -201,26 +238,35 @@ class _Matrix:
         return 16 * n_freq * self.shape[0] * self.shape[1]
 
 
-def _describe(file: UniversalFile, nodes: Collection[int] | None) -> _Content:
-    """Find the FRFs that can be used and are wanted, and what their headers say."""
-    content = _Content()
+def _describe(file: UniversalFile, reading: Reading) -> _Content:
+    """Find the FRFs that can be used and are wanted, and what their headers state."""
+    content, headers = _Content(), dict[int, FunctionHeader]()
     for number in file.datasets(58):
         with file.damage_named(number):
-            header = read_header(file.content(number, HEAD))
-        content.functions[header.kind] += 1
-        is_wanted = nodes is None or {header.response[1], header.reference[1]} <= set(nodes)
-        if header.kind not in (_FRF, _COHERENCE) or not is_wanted:
-            continue
-        try:
-            if header.kind == _FRF:
-                content.frfs.append(_describe_frf(file, number, header))
-            else:
-                content.coherences.append((number, header, _channels(header)))
-        except _UnusableFrfError as error:
-            if header.kind == _FRF:
-                content.unusable.setdefault(str(error), []).append(number)
-            else:
-                file.note(f"coherence left out: {error}", number)
+            headers[number] = read_header(file.content(number, HEAD))
+        content.functions.setdefault(headers[number].kind, []).append(number)
+    namer = reading.mapping.namer
+    for kind in (_FRF, _COHERENCE):
+        numbers = content.functions.get(kind, [])
+        names = [reading.mapping.names_of(side, len(numbers), str(file.path)) for side in ("responses", "excitations")]
+        for place, number in enumerate(numbers):
+            header = headers[number]
+            given = [None if own is None else own[place] for own in names]
+            try:
+                channels = _channels(file, header, namer, given, content)
+                if reading.nodes is not None and not {each.node for each in channels} <= reading.nodes:
+                    continue
+                if kind == _COHERENCE:
+                    content.coherences.append((number, header, channels))
+                else:
+                    content.frfs.append(_describe_frf(file, number, header, channels, reading))
+            except _UnusableFrfError as error:
+                if reading.nodes is not None and not {header.response[1], header.reference[1]} <= reading.nodes:
+                    continue
+                if kind == _COHERENCE:
+                    file.note(f"coherence left out: {error}", number)
+                else:
+                    content.unusable.setdefault(str(error), []).append(number)
     return content
 
 
@@ -229,21 +275,22 @@ def _no_frf(file: UniversalFile, content: _Content, nodes: Collection[int] | Non
     if content.unusable:
         why = "; ".join(f"{reason} ({name_some('dataset', numbers)})" for reason, numbers in content.unusable.items())
         return file.error(f"holds no FRF that can be used: {why}")
-    if content.functions[_FRF] and nodes is not None:
+    if _FRF in content.functions and nodes is not None:
         return file.error(f"holds no FRF between {name_some('node', sorted(nodes))}")
-    times = f"; {TIME_DATA}" if content.functions[_TIME_HISTORY] else ""
+    times = f"; {TIME_DATA}" if _TIME_HISTORY in content.functions else ""
     return file.error(f"holds {file.held_without_frf(content.functions)}{times}")
 
 
-def _describe_frf(file: UniversalFile, number: int, header: FunctionHeader) -> _Frf:
-    """Channels, quantity and factor to SI of one FRF."""
-    quantity, forced = file.reading.quantity, file.reading.forced
+def _describe_frf(
+    file: UniversalFile, number: int, header: FunctionHeader, channels: tuple[Channel, Channel], reading: Reading
+) -> _Frf:
+    """Quantity and factor to SI of one FRF."""
+    quantity, forced = reading.quantity, reading.forced
     _check_form(file, number, header)
     numerator, denominator = header.numerator, header.denominator
     other = kind_of_frf(numerator, denominator)
     if other is not None:
         raise _UnusableFrfError(f"it is {other}, not motion per force")
-    channels = _channels(header)
     system = file.unit_system(number)
     said = ordinate_quantity(numerator, denominator, channels)
     if quantity and said and said != quantity and not forced:
@@ -307,34 +354,69 @@ def _check_form(file: UniversalFile, number: int, header: FunctionHeader) -> Non
         raise file.error(f"holds binary numbers in dataset {number} that are not IEEE 754 after 11 lines of text")
 
 
-def _channels(header: FunctionHeader) -> tuple[Channel, Channel]:
-    """Return response and reference."""
-    return _channel(header.response, "response"), _channel(header.reference, "reference")
+def _channels(
+    file: UniversalFile, header: FunctionHeader, namer: ChannelNamer, given: Sequence[Any], content: _Content
+) -> tuple[Channel, Channel]:
+    """Return response and reference: by their names where the user gives them, else by the header."""
+    found = []
+    sides = ("response", header.response, given[0]), ("reference", header.reference, given[1])
+    for role, (entity, node, code), name in sides:
+        if name is None and node < 1:
+            raise _UnusableFrfError(f"it names no {role} node (node {node}); give mapping responses= and excitations=")
+        if name is None and code not in DIRECTION_CODES and (code != 0 or namer.direction is None):
+            raise _UnusableFrfError(f"it names no {role} direction (code {code}); give mapping direction=z")
+        component = "" if entity.upper() == "NONE" else entity
+        try:
+            if name is None:
+                found.append(namer.numbered(component, node, DIRECTION_CODES.get(code, ""), f"{role}s"))
+                content.numbered.setdefault(node, set()).add(found[-1].node)
+            else:
+                found.append(namer.channel(f"{role}s", name))
+        except ValueError as error:
+            raise file.error(str(error)) from error
+    return found[0], found[1]
 
 
-def _channel(place: tuple[str, int, int], role: str) -> Channel:
-    _, node, direction = place
-    if node < 1:
-        raise _UnusableFrfError(f"it names no {role} node (node {node})")
-    if direction not in DIRECTION_CODES:
-        raise _UnusableFrfError(f"it names no {role} direction (code {direction})")
-    return Channel(node, DIRECTION_CODES[direction])
-
-
-def _unique(file: UniversalFile, frfs: list[_Frf]) -> list[_Frf]:
-    """Keep the first of FRFs between the same channels; raise for two structures that share their numbers."""
+def _unique(frfs: list[_Frf]) -> tuple[list[_Frf], list[tuple[_Frf, _Frf]]]:
+    """Return the first FRF between the same channels, and each further one with the first."""
     first: dict[tuple[Channel, Channel], _Frf] = {}
+    again = []
     for frf in frfs:
         kept = first.setdefault(frf.channels, frf)
-        names = [f"'{each.header.response[0]}' / '{each.header.reference[0]}'" for each in (kept, frf)]
-        if names[0] != names[1]:
-            raise file.error(
-                f"holds FRF {frf} for the entities {names[0]} (dataset {kept.dataset}) and {names[1]} (dataset "
-                f"{frf.dataset}): node numbers must be unique in the file"
-            )
         if kept is not frf:
-            file.note("a second FRF between the same channels is left out", frf.dataset)
-    return list(first.values())
+            again.append((kept, frf))
+    return list(first.values()), again
+
+
+def _note_repetitions(
+    file: UniversalFile,
+    again: list[tuple[_Frf, _Frf]],
+    matrix: _Matrix,
+    common: str,
+    lines: NDArray[np.float64],
+    h: NDArray[np.complex128],
+) -> None:
+    """Take a note of FRFs between the same channels as another one, and how far they differ from the one in use."""
+    worst, numbers = (0.0, ""), []
+    for kept, frf in again:
+        freq_hz, value = _read_function(file, frf.dataset, frf.header, str(frf), np.complex128)
+        if not same_lines(lines, freq_hz):
+            file.note("a further FRF between the same channels is left out: it has other frequency lines", frf.dataset)
+            continue
+        share = difference_of(h[:, *matrix.place_of[frf.channels]], _as_common(frf, common, freq_hz, value))
+        worst = max(worst, (share, f"{frf}, dataset {kept.dataset} is used"))
+        numbers.append(frf.dataset)
+    if numbers:
+        file.note(repetition_note(*worst, len(numbers)), *numbers)
+
+
+def _as_common(
+    frf: _Frf, common: str, freq_hz: NDArray[np.float64], value: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """Return an FRF in SI units, as the quantity that all are given as."""
+    power = POWER_OF_I_OMEGA[common] - POWER_OF_I_OMEGA[frf.quantity]
+    with np.errstate(over="ignore", invalid="ignore"):
+        return value * frf.factor * (2j * np.pi * freq_hz) ** power if power else value * frf.factor
 
 
 def _values(
@@ -353,10 +435,7 @@ def _values(
         elif not same_lines(lines, freq_hz):
             held = [f"{_lines(f)} in dataset {each.dataset} ({each})" for f, each in ((lines, frfs[0]), (freq_hz, frf))]
             raise file.error(f"holds FRFs at different frequencies: {held[0]}, {held[1]}")
-        power = POWER_OF_I_OMEGA[common] - POWER_OF_I_OMEGA[frf.quantity]
-        with np.errstate(over="ignore", invalid="ignore"):
-            value = value * frf.factor * (2j * np.pi * freq_hz) ** power if power else value * frf.factor
-        h[:, *matrix.place_of[frf.channels]] = value
+        h[:, *matrix.place_of[frf.channels]] = _as_common(frf, common, freq_hz, value)
     return lines, h, common
 
 
@@ -434,31 +513,6 @@ def _is_scrambled(value: NDArray[Any]) -> bool:
     parts = abs(np.ascontiguousarray(value).view(np.float64))
     parts = parts[np.isfinite(parts) & (parts > 0.0)]
     return bool(parts.size and np.log10(parts.max()) - np.log10(parts.min()) > _MOST_DECADES)
-
-
-def _without_bad_zero_line(
-    file: UniversalFile,
-    frfs: list[_Frf],
-    matrix: _Matrix,
-    freq_hz: NDArray[np.float64],
-    h: NDArray[np.complex128],
-    coherence: NDArray[np.float64] | None,
-) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64] | None]:
-    """Drop a line at 0 Hz with NaN or Inf, as division by a zero spectrum leaves it; raise for one elsewhere."""
-    drop = False
-    for frf in frfs:
-        bad = freq_hz[~np.isfinite(h[:, *matrix.place_of[frf.channels]])]
-        if bad.size and bad[-1] > 0.0:
-            first = bad[bad > 0.0][0]
-            raise file.error(f"holds NaN or Inf in dataset {frf.dataset} ({frf}), first at {first:g} Hz")
-        if bad.size:
-            file.note("the line at 0 Hz holds NaN or Inf and is dropped", frf.dataset)
-            drop = True
-    if drop and freq_hz.size == 1:
-        raise file.error("holds nothing but NaN or Inf at 0 Hz")
-    if not drop:
-        return freq_hz, h, coherence
-    return freq_hz[1:], h[1:], None if coherence is None else coherence[1:]
 
 
 def _lines(freq_hz: NDArray[np.float64]) -> str:
@@ -581,7 +635,8 @@ def _double(value: float, digits: int) -> str:
 
 
 def _begins_dataset(head: bytes) -> bool:
-    return next((line for line in head.splitlines() if line.strip()), b"").strip() == b"-1"
+    lines = head.removeprefix(codecs.BOM_UTF8).splitlines()
+    return next((line for line in lines if line.strip()), b"").strip() == b"-1"
 
 
 UNIVERSAL_FILE = FileFormat(
@@ -592,5 +647,5 @@ UNIVERSAL_FILE = FileFormat(
     looks_alike=lambda path, _: path.suffix.lower() in (".uff", ".unv"),
     read=_read,
     write=write_uff,
-    takes=("direction", "components", "frequency", "coordinates"),
+    takes=("responses", "excitations", "direction", "components", "frequency", "coordinates"),
 )

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import codecs
 import re
-from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from bisect import bisect_left
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,17 +17,22 @@ from numpy.typing import NDArray
 from jointfrf.errors import FileContentError
 from jointfrf.files import HEAD
 from jointfrf.io.file_format import Reading
+from jointfrf.io.uff_function import DamagedNumbersError
 from jointfrf.io.units import UnitSystem
 from jointfrf.spelling import some_of
 
 __all__ = ["UniversalFile", "index_datasets", "name_some", "node_coordinates"]
 
-#: A line of -1 in columns 5 and 6, which some programs fill with blanks to column 80.
-_DELIMITER = re.compile(rb"(?<![^\r\n])    -1(?=[\r\n]|\Z| {74})")
+#: The -1 of a delimiter, which blanks may follow up to column 128.
+_DELIMITER = re.compile(rb"-1[ \t]{0,122}(?=[\r\n]|\Z)")
+#: Most blanks before it; numbers in columns have more.
+_INDENT = 5
 #: After binary numbers no line need end.
-_AFTER_NUMBERS = re.compile(rb"\s{0,4}?    -1(?=[\r\n]|\Z| {74})")
-#: Bytes that decide whether a place is a delimiter: four blanks, six columns, 74 blanks, line ends.
-_REACH = 96
+_AFTER_NUMBERS = re.compile(rb"\s{0,4}?( {4}-1)[ \t]{0,122}(?=[\r\n]|\Z)")
+#: Bytes that decide whether a place is a delimiter: blanks before and behind, line ends.
+_REACH = 140
+#: Bytes of a dataset from its delimiter on, among which its type stands.
+_TYPE = 300
 #: Bytes of the file in memory: fewer take longer, more do not take less time.
 _CHUNK = 1 << 22
 #: Bytes of a value by the data type of record 7, and of the abscissa before it where the spacing is uneven.
@@ -60,13 +66,14 @@ def index_datasets(path: Path) -> tuple[list[Dataset], bool]:
     with path.open("rb") as file:
         window = _Window(file)
         found: list[Dataset] = []
-        start = window.find(0)
-        while start is not None:
-            end = window.after_binary(start) or window.find(start + 6)
-            if end is None:
+        opening = window.find(0)
+        while opening is not None:
+            start = opening[0]
+            closing = window.after_binary(start) or window.find(opening[1])
+            if closing is None:
                 return found, True
-            found.append(Dataset(start, end, _kind(window.part(start, HEAD))))
-            start = window.find(end + 6)
+            found.append(Dataset(start, closing[0], _kind(window.part(start, HEAD))))
+            opening = window.find(closing[1])
         return found, False
 
 
@@ -84,33 +91,36 @@ class _Window:
             place = 0
         return self.content[place : place + count]
 
-    def find(self, position: int) -> int | None:
-        """Return the place of the next delimiter."""
+    def find(self, position: int) -> tuple[int, int] | None:
+        """Return where the line of the next delimiter begins, and where it ends."""
         while True:
-            before = max(position - 1, 0)  # whether a line begins
+            before = max(position - _INDENT - 1, 0)  # where its line may begin
             if not self.start <= before < self.start + len(self.content):
                 self._move(before)
-            match = self._search(position - self.start)
+            found = self._search(position - self.start)
             is_last = len(self.content) < _CHUNK
-            if match is not None and (is_last or match.end() + _REACH <= len(self.content)):
-                return self.start + match.start()
+            if found is not None and (is_last or found[1] + _REACH <= len(self.content)):
+                return self.start + found[0], self.start + found[1]
             if is_last:
                 return None
             # Once more from where the window may cut a delimiter.
             end = self.start + len(self.content)
-            position = max(position, end - _REACH) if match is None else self.start + match.start()
-            self._move(max(position - 1, 0))
+            position = max(position, end - _REACH) if found is None else self.start + found[0]
+            self._move(max(position - _INDENT - 1, 0))
 
-    def _search(self, place: int) -> re.Match[bytes] | None:
-        """Return the first delimiter in the window; looking for its six bytes first is ten times as fast."""
-        while (place := self.content.find(b"    -1", place)) >= 0:
-            if match := _DELIMITER.match(self.content, place):
-                return match
-            place += 1
+    def _search(self, place: int) -> tuple[int, int] | None:
+        """Return begin and end of the first delimiter in the window."""
+        for match in _DELIMITER.finditer(self.content, place):
+            start = match.start()
+            indent = self.content[max(start - _INDENT, 0) : start]
+            begin = start - len(indent) + len(indent.rstrip(b" \t"))
+            is_first = self.start == 0 and begin in (0, 3) and self.content[:begin] in (b"", codecs.BOM_UTF8)
+            if is_first or (begin and self.content[begin - 1 : begin] in (b"\r", b"\n")):
+                return begin, match.end()
         return None
 
-    def after_binary(self, start: int) -> int | None:
-        """Return the place of the delimiter after the binary numbers of a dataset 58b, by their length.
+    def after_binary(self, start: int) -> tuple[int, int] | None:
+        """Return begin and end of the delimiter after the binary numbers of a dataset 58b, by their length.
 
         The one that is stated, or, where no delimiter follows there, the one that record 7 gives: some programs state
         another.
@@ -129,7 +139,7 @@ class _Window:
         for length in (n_bytes, _length_of_values(lines[8])):
             match = _AFTER_NUMBERS.match(self.part(numbers + length, _REACH))
             if match is not None:
-                return numbers + length + match.end() - 6
+                return numbers + length + match.start(1), numbers + length + match.end()
         return None
 
     def _move(self, position: int) -> None:
@@ -149,7 +159,7 @@ def _length_of_values(record: bytes) -> int:
 
 def _kind(head: bytes) -> int:
     try:
-        return int(head.splitlines()[1][:6])
+        return int(head[:_TYPE].splitlines()[1][:6])
     except (ValueError, IndexError):
         return 0
 
@@ -191,6 +201,9 @@ class UniversalFile:
                 "ends inside its first dataset" if is_cut else "is not a Universal File: no dataset delimiters (-1)"
             )
         self.types = [dataset.kind for dataset in self._index]
+        self._numbers: dict[int, list[int]] = {}
+        for number, kind in enumerate(self.types, start=1):
+            self._numbers.setdefault(kind, []).append(number)
         for number, kind in enumerate(self.types, start=1):
             if kind <= 0:
                 raise self.error(f"is damaged: dataset {number} has no type, a delimiter (-1) is missing before it")
@@ -207,8 +220,9 @@ class UniversalFile:
         try:
             yield
         except (ValueError, LookupError, OverflowError) as error:
-            kind = self.types[dataset - 1]
-            raise self.error(f"is damaged: dataset {dataset} (type {kind}) cannot be read") from error
+            where = f"dataset {dataset} (type {self.types[dataset - 1]})"
+            why = str(error) if isinstance(error, DamagedNumbersError) else "it cannot be read"
+            raise self.error(f"is damaged in {where}: {why}; export it again") from error
 
     def note(self, sentence: str, *datasets: int) -> None:
         """Keep something for the user to know about some datasets."""
@@ -220,15 +234,18 @@ class UniversalFile:
 
     def datasets(self, *kinds: int) -> list[int]:
         """Numbers of the datasets of some types."""
-        return [number for number, kind in enumerate(self.types, start=1) if kind in kinds]
+        if len(kinds) == 1:
+            return self._numbers.get(kinds[0], [])
+        return sorted(number for kind in kinds for number in self._numbers.get(kind, ()))
 
-    def held_without_frf(self, functions: Counter[int]) -> str:
+    def function_name(self, kind: int, count: int = 1) -> str:
+        """Return what a type of function of dataset 58 is called."""
+        return f"{_plural(_FUNCTIONS.get(kind, 'function of another kind'), count)} (dataset 58, function type {kind})"
+
+    def held_without_frf(self, functions: Mapping[int, Sequence[int]]) -> str:
         """Say what the file holds: the functions of dataset 58, by their types, or where there are none, datasets."""
         if functions:
-            names = {
-                kind: _plural(_FUNCTIONS.get(kind, "function of another kind"), n) for kind, n in functions.items()
-            }
-            held = [f"{n} {names[kind]} (dataset 58, function type {kind})" for kind, n in functions.items()]
+            held = [f"{len(own)} {self.function_name(kind, len(own))}" for kind, own in functions.items()]
             return f"{', '.join(held)} and no FRF"
         kinds = [f"{kind} ({_DATASETS[kind]})" if kind in _DATASETS else str(kind) for kind in sorted(set(self.types))]
         return f"{_plural('dataset', len(kinds))} {', '.join(kinds)} and no FRF (dataset 58, function type 4)"
@@ -250,8 +267,8 @@ class UniversalFile:
         """Units of a dataset: the last dataset 164 before it, else the first of the file, else None."""
         if self._systems is None:
             self._systems = {number: self._read_unit_system(number) for number in self.datasets(164)}
-        before = [system for number, system in self._systems.items() if number < dataset]
-        return before[-1] if before else next(iter(self._systems.values()), None)
+        numbers = self.datasets(164)
+        return self._systems[numbers[max(bisect_left(numbers, dataset) - 1, 0)]] if numbers else None
 
     def _read_unit_system(self, dataset: int) -> UnitSystem:
         with self.damage_named(dataset):
@@ -306,14 +323,14 @@ def node_coordinates(file: UniversalFile, nodes: Collection[int]) -> dict[int, N
     that no dataset (18, 2420) defines is taken as global.
     """
     coordinates: dict[int, NDArray[np.float64]] = {}
-    axes = _coordinate_systems(file)
+    axes, wanted = _coordinate_systems(file), set(nodes)
     for number in file.datasets(15, 2411):
         try:
             rows = _node_rows(file.records(number))
         except ValueError:
             file.note("the coordinates of nodes cannot be read and are left out", number)
             continue
-        rows = rows[np.isin(rows[:, 0], list(nodes))]
+        rows = rows[[node in wanted for node in rows[:, 0].tolist()]]
         turned = [int(row[0]) for row in rows if axes.get(int(row[2]), _Axes()).turned]
         if turned:
             file.note(

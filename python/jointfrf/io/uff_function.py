@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import accumulate
@@ -19,6 +19,7 @@ from jointfrf.io.units import SAME_FACTOR, Exponents, Unit, UnitSystem, parse_un
 __all__ = [
     "DELIMITER",
     "Axis",
+    "DamagedNumbersError",
     "FunctionHeader",
     "axis_record",
     "function_dataset",
@@ -45,6 +46,10 @@ def _cuts(*widths: int) -> list[slice]:
 #: Columns of the type line of 58b, of record 6, of record 7, and of records 8 to 11.
 _BINARY, _PLACE = _cuts(6, 1, 6, 6, 12, 12), _cuts(5, 10, 5, 10, 11, 10, 4, 11, 10, 4)
 _FORM, _AXIS = _cuts(10, 10, 10, 13, 13, 13), _cuts(10, 5, 5, 5, 21, 21)
+#: Which fields of record 6 are numbers.
+_PLACE_NUMBERS = (0, 1, 2, 3, 5, 6, 8, 9)
+#: Columns of an abscissa: by the definition, and as other programs write it before values in double precision.
+_ABSCISSA_WIDTHS = (13, 20)
 #: By the ordinate data type of record 7: bytes of a number, and numbers of a value.
 _NUMBERS = {2: (4, 1), 4: (8, 1), 5: (4, 2), 6: (8, 2)}
 #: By the data types of records 8 to 11.
@@ -86,8 +91,10 @@ class Axis:
 @lru_cache(256)  # a file repeats few of them in thousands of functions
 def _axis(record: bytes) -> Axis:
     """Take an axis from its record."""
-    data_type, *_ = map(int, _columns(_text(record), _AXIS[:4]))  # and three exponents, which are not used
-    label = _unit_label(record)
+    text = _text(record)
+    words = _fields(text, _AXIS, range(4))
+    data_type, *_ = map(int, words[:4])  # and three exponents, which are not used
+    label = _unit_label(record) if words == _columns(text, _AXIS) else words[5]
     label = "" if label.upper() == "NONE" else label
     return Axis(data_type, label, parse_unit(label))
 
@@ -111,6 +118,10 @@ def _unit_label(record: bytes) -> str:
     return "' or '".join(labels)  # which is not understood if there are two
 
 
+class DamagedNumbersError(ValueError):
+    """Where the numbers of a dataset cannot be read, as the end of a sentence."""
+
+
 class FunctionHeader(NamedTuple):
     """What the records before the numbers say; of response and reference: entity, node and direction code."""
 
@@ -129,6 +140,7 @@ class FunctionHeader(NamedTuple):
     is_big_endian: bool
     is_supported: bool
     length: int
+    n_lines: int
 
 
 def read_header(content: bytes) -> FunctionHeader:
@@ -146,10 +158,10 @@ def read_header(content: bytes) -> FunctionHeader:
     """
     lines = content[:HEAD].splitlines(keepends=True)[:_N_LINES]
     records = [_text(line.rstrip(b"\r\n")) for line in lines]
-    place, form = _columns(records[7], _PLACE), _columns(records[8], _FORM)
+    place, form = _fields(records[7], _PLACE, _PLACE_NUMBERS), _fields(records[8], _FORM, range(6))
     is_binary = records[1][6:7].lower() == "b"
     order, floating_point, n_lines, _ = map(int, _columns(records[1], _BINARY)[2:]) if is_binary else (1, 2, 11, 0)
-    start, step, _ = (float(word.replace("D", "E").replace("d", "e")) for word in form[3:])
+    start, step, _ = map(_number, form[3:])
     abscissa, numerator, denominator, _ = (_axis(line.rstrip(b"\r\n")) for line in lines[9:13])
     return FunctionHeader(
         int(place[0]),
@@ -167,6 +179,7 @@ def read_header(content: bytes) -> FunctionHeader:
         order == 2,
         order in (1, 2) and (floating_point, n_lines) == (2, _N_TEXT_LINES),  # IEEE 754 after 11 lines of text
         sum(map(len, lines)),
+        len(lines),
     )
 
 
@@ -182,12 +195,12 @@ def function_values(content: bytes, header: FunctionHeader) -> tuple[NDArray[np.
     Returns
     -------
     abscissa, ordinate : ndarray, shape (n,)
-        As many as there are, whatever the header says.
+        As many as there are, whatever the header says; of text without zeros that fill the last line.
 
     Raises
     ------
-    ValueError
-        There is no number where one should be.
+    DamagedNumbersError
+        A line of text holds something else than numbers.
     """
     size, parts = _NUMBERS[header.number_type]
     data = content[header.length :]
@@ -211,20 +224,81 @@ def _binary_rows(data: bytes, header: FunctionHeader, size: int, parts: int) -> 
 
 
 def _text_rows(data: bytes, header: FunctionHeader, size: int, parts: int) -> NDArray[np.float64]:
-    """Return what belongs to each value: 6E13.5 in single precision, else 4E20.12, with an abscissa E13.5 before."""
-    width = 13 if size == 4 else 20
-    widths = [width] * parts if header.is_even else [13, *[width] * parts]
-    lines = data.decode("ascii", "replace").replace("D", "E").replace("d", "e").splitlines(keepends=True)
-    cuts = _cuts(*widths * (max(map(len, lines), default=0) // sum(widths) + 1))
-    words = (line[cut] for line in lines for cut in cuts if cut.stop <= len(line))
-    numbers = [float(word) for word in words if not word.isspace()]
-    count = len(numbers) // len(widths)
-    return np.array(numbers[: count * len(widths)], np.float64).reshape(count, len(widths))
+    """Return what belongs to each value.
+
+    By the definition values stand in columns, 6E13.5 in single precision, else 4E20.12, with an abscissa E13.5 before.
+    Numbers between blanks are read whatever their columns are; columns count if numbers touch each other.
+    """
+    lines = data.decode("ascii", "replace").splitlines(keepends=True)
+    width, wanted = 13 if size == 4 else 20, header.n_values
+    of_each = parts + (not header.is_even)
+    found = None
+    for widths in ([], *([first] * (of_each - parts) + [width] * parts for first in _ABSCISSA_WIDTHS)):
+        by_line = _numbers_of(lines, widths)
+        numbers = [number for line in by_line for number in line]
+        if len(by_line) == len(lines):
+            last = next((len(line) for line in reversed(by_line) if line), 0)
+            filling = numbers[of_each * wanted :]
+            if wanted > 0 and 0 < len(filling) < last and not any(filling):
+                numbers = numbers[: of_each * wanted]
+            if found is None or len(numbers) == of_each * wanted:
+                found = numbers
+            if len(found) == of_each * wanted:
+                break
+        else:
+            bad = len(by_line)
+    if found is None:
+        raise DamagedNumbersError(f"line {header.n_lines + bad + 1} of it is not numbers: {lines[bad].strip()[:40]!r}")
+    count = len(found) // of_each
+    return np.array(found[: count * of_each], np.float64).reshape(count, of_each)
+
+
+def _numbers_of(lines: list[str], widths: list[int]) -> list[list[float]]:
+    """Return the numbers of each line, between blanks or in columns of these widths, up to the first line of others."""
+    cuts = _cuts(*widths * (max(map(len, lines), default=0) // sum(widths) + 1)) if widths else []
+    found = []
+    try:
+        for line in lines:
+            words = line.split()
+            if widths:
+                words = [word for word in (line[cut] for cut in cuts if cut.stop <= len(line)) if not word.isspace()]
+            try:
+                found.append(list(map(float, words)))
+            except ValueError:
+                found.append(list(map(_number, words)))
+    except ValueError:
+        pass
+    return found
+
+
+def _number(word: str) -> float:
+    """Return a number of Fortran; NaN for the words that old run-time libraries have for it."""
+    text = word.strip().replace("D", "E").replace("d", "e")
+    if "#" in text or (text and not text.strip("*")):  # 1.#QNAN of Windows; stars for what does not fit its columns
+        return math.nan
+    return float(text)
 
 
 def _columns(record: str, cuts: list[slice]) -> list[str]:
     """Cut a record into its fields."""
     return [record[cut].strip() for cut in cuts]
+
+
+def _fields(record: str, cuts: list[slice], numbers: Iterable[int]) -> list[str]:
+    """Return the fields of a record: in the columns of the definition, or if these hold no numbers, between blanks."""
+    fields = _columns(record, cuts)
+    if all(_is_number(fields[i]) for i in numbers if fields[i]):
+        return fields
+    words = record.split(None, len(cuts) - 1)
+    return words if len(words) == len(cuts) and all(_is_number(words[i]) for i in numbers) else fields
+
+
+def _is_number(word: str) -> bool:
+    try:
+        _number(word)
+    except ValueError:
+        return False
+    return " " not in word
 
 
 def _whole(word: str) -> int:

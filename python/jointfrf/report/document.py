@@ -281,7 +281,7 @@ def _view(part: Part) -> dict[str, Any]:
 
 def _as_address(svg: bytes) -> str:
     """Return a drawing as the address of an image, in a quarter less than base64 takes."""
-    text = re.sub("<[^>]*>", lambda tag: tag[0].replace("'", "").replace('"', "'"), svg.decode())
+    text = re.sub("<[^<>]*>", lambda tag: tag[0].replace("'", "").replace('"', "'"), svg.decode())
     return "data:image/svg+xml," + quote(" ".join(text.split()), safe=" !$&'()*+,-./:;=?@_~|")
 
 

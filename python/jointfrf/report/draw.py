@@ -366,9 +366,9 @@ def _draw_intervals(ax: Any, panel: Panel) -> None:
 
 
 #: What `shortened` looks for: lines of straight pieces, styles, numbers.
-_LINE = re.compile(r' d="M ([\d.\sL-]+?)\s*(z?)\s*"')
+_LINE = re.compile(r' d="M ([\d.\sL-]++)(z?)\s*+"')
 _STYLE = re.compile(r' style="([^"]*)"')
-_DECIMALS = re.compile(r"\d+\.\d{3,}")
+_DECIMALS = re.compile(r"(?<!\d)\d++\.\d{3,}")
 
 
 def shortened(svg: str) -> str:
@@ -392,7 +392,7 @@ def shortened(svg: str) -> str:
     '<g><path d="m1.23 2 1.27 0.25" style="fill: none"/></g>'
     """
     svg = svg[svg.index("<svg") if "<svg" in svg else 0 :]
-    svg = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", svg, flags=re.DOTALL)
+    svg = re.sub(r"<metadata>(?:(?!</?metadata>).)*</metadata>|<!--(?:(?!-->|<!--).)*-->", "", svg, flags=re.DOTALL)
     svg = re.sub(r">\s+<", "><", svg)
     svg = re.sub(r'<g id="[^"]*"', "<g", svg)
     svg = _LINE.sub(_steps, svg)

@@ -39,7 +39,7 @@ _LEAST_PERCENT = 1e-3
 #: What a formula of a spreadsheet begins with.
 _FORMULA = ("=", "+", "-", "@")
 #: Numbers with blanks between, which are none.
-_NUMBERS = re.compile(r"([-+]?[\d.]+(e[-+]?\d+)? ?)+")
+_NUMBERS = re.compile(r"(?:[-+]?[\d.]++(?:e[-+]?\d++)? ?)++")
 
 
 @dataclass(frozen=True)

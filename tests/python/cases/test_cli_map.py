@@ -120,18 +120,18 @@ def test_files_of_cases_and_assemblies_map_as_well(tmp_path):
     assert fit["parameters"]["k_y"]["value"] == pytest.approx(6e5, rel=1e-3)
     Path("assembly.toml").write_text(text.replace("axes =", "axis ="))
     result = said("identify", "c.npz", "--model", "assembly.toml", expect=1)
-    assert "mapping names 'axis'" in result.stderr or "--map names 'axis'" in result.stderr
+    assert "unknown field 'axis' in --map; use one of freq_hz, h, " in result.stderr
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"response_nodes": None}, "has no field response_nodes: say which one holds it by --map"),
+        ({"response_nodes": None}, "has no field response_nodes; give --map response_nodes=..."),
         ({"response_nodes": "zz.codes_"}, "has no field 'zz.codes_'"),
         ({"response_directions": "zz.lines"}, "has 6 nodes of responses, but 491 directions"),
         ({"response_nodes": "zz.way"}, "the nodes of the responses (zz.way) are not whole numbers"),
-        ({"responses": "1:x"}, "has responses as names and as nodes and directions: leave one out of --map"),
-        ({"h": None}, "by --map"),
+        ({"responses": "1:x"}, "has responses as names and as nodes and directions; leave one out of --map"),
+        ({"h": None}, "has no field for the FRFs; give --map h=... out of zz.A, "),
     ],
 )  # fmt: skip
 def test_a_wrong_map_is_one_sentence(change, message):

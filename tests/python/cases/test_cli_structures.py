@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
-from scipy import sparse
+from scipy import linalg, sparse
 
 import jointfrf as jf
 from command import run_command
@@ -355,3 +355,64 @@ def test_validate_says_what_is_wrong(words, status, error):
     result = run_command(*words)
     assert result.returncode == status
     assert error in result.stderr
+
+
+def modes_of_b(path, damping=0.01):
+    """Write all modes of beam B as arrays, at the same places as the model, and return that model."""
+    k, m = (np.asarray(one.toarray() if sparse.issparse(one) else one).real for one in (B.stiffness, B.mass))
+    squared, shapes = linalg.eigh(k, m)
+    omega = np.sqrt(np.maximum(squared, 0))
+    omega[squared < 1e-9 * squared[-1]] = 0
+    names = [dof.replace("theta", "theta_z") for dof in B.dofs]
+    np.savez(path, Fn=omega / (2 * np.pi), Xi=np.full(omega.size, damping), Phi=shapes, modal_mass=np.ones(omega.size),
+             dofs=names)  # fmt: skip
+    c = m @ shapes @ np.diag(2 * damping * omega) @ shapes.T @ m
+    return jf.Model(k, m, B.dofs, damping=c)
+
+
+@pytest.mark.parametrize("more", ["", 'joint = ["1:y", "1:theta_z"]\n'])
+def test_parts_by_modes(tmp_path, more):
+    """`frf` writes their receptances, `couple` takes them as a side: as the model has it whose modes they are."""
+    model = modes_of_b(tmp_path / "modes.npz")
+    modes = tmp_path / "modes.toml"
+    modes.write_text('model = "modes"\nfile = "modes.npz"\n' + more)
+    expected = model.receptance(FREQ_HZ, range(len(B.dofs)))
+    result = run_command("frf", modes, *LINES, "--output", tmp_path / "b.npz")
+    assert result.returncode == 0, result.stderr
+    assert "modes.npz: 6 modes of 8 DOFs" in result.stdout
+    assert "2 rigid motions" in result.stdout
+    written = read_frfs(tmp_path / "b.npz")
+    np.testing.assert_allclose(written.h, expected, rtol=1e-6, atol=1e-9 * abs(expected).max())
+    coupled = []
+    for side in (modes, tmp_path / "b.npz"):
+        out = tmp_path / f"c{len(coupled)}.npz"
+        words = [
+            "a.toml",
+            side,
+            "--joint",
+            "joint.toml",
+            "--j",
+            "5",
+            "--k",
+            "1",
+            "--renumber-b",
+            "100",
+            "--output",
+            out,
+        ]
+        result = run_command("couple", *words, *(LINES if side is modes else []))
+        assert result.returncode == 0, result.stderr
+        coupled.append(read_frfs(out))
+    np.testing.assert_allclose(coupled[0].h, coupled[1].h, rtol=1e-9)
+
+
+def test_a_wrong_part_by_modes_is_one_sentence(tmp_path):
+    (tmp_path / "modes.toml").write_text('model = "modes"\nfile = "none.npz"\n')
+    result = run_command("frf", tmp_path / "modes.toml", *LINES, "--output", tmp_path / "b.npz")
+    assert result.returncode == 1
+    assert "none.npz does not exist" in result.stderr
+    assert result.stderr.count("\n") == 1
+    modes_of_b(tmp_path / "none.npz")
+    result = run_command("frf", tmp_path / "modes.toml", *LINES, "--points", "9:y", "--output", tmp_path / "b.npz")
+    assert result.returncode == 1
+    assert "there is no DOF '9:y'" in result.stderr

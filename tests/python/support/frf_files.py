@@ -94,17 +94,17 @@ def _put73(h5py, group, cells, name, value):
         inside.attrs["MATLAB_class"] = np.bytes_("struct")
         for key, each in value.items():
             _put73(h5py, inside, cells, key, each)
+    elif isinstance(value, list) and all(isinstance(each, dict) for each in value):
+        inside = group.create_group(name)
+        inside.attrs["MATLAB_class"] = np.bytes_("struct")
+        for field in value[0]:
+            references = _references(h5py, cells, [each[field] for each in value])
+            inside.create_dataset(field, data=references, dtype=h5py.ref_dtype)  # without a class, unlike cells
     elif isinstance(value, str):
         data = group.create_dataset(name, data=np.array([[ord(letter)] for letter in value], np.uint16))
         data.attrs["MATLAB_class"] = np.bytes_("char")
     elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
-        references = []
-        for each in value:
-            _put73(h5py, cells, cells, key := f"c{len(cells)}", each)
-            references.append(cells[key].ref)
-        data = group.create_dataset(
-            name, data=np.array(references, h5py.ref_dtype).reshape(-1, 1), dtype=h5py.ref_dtype
-        )
+        data = group.create_dataset(name, data=_references(h5py, cells, value), dtype=h5py.ref_dtype)
         data.attrs["MATLAB_class"] = np.bytes_("cell")
     else:
         array = np.atleast_2d(np.asarray(value)).T
@@ -114,6 +114,14 @@ def _put73(h5py, group, cells, name, value):
             array = both
         data = group.create_dataset(name, data=array)
         data.attrs["MATLAB_class"] = np.bytes_("double")
+
+
+def _references(h5py, cells, values):
+    references = []
+    for each in values:
+        _put73(h5py, cells, cells, key := f"c{len(cells)}", each)
+        references.append(cells[key].ref)
+    return np.array(references, h5py.ref_dtype).reshape(-1, 1)
 
 
 def write_sdynpy(path, frfs, function_type=4):

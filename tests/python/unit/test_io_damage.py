@@ -312,13 +312,15 @@ def test_mixed_files(tmp_path):
     path = tmp_path / "mixed.uff"
     others = [dataset(151, *["x"] * 7).encode(), function(np.ones(3), function_type=1, number_type=4)]
     path.write_bytes(b"".join([*others, function(), *others]))
-    np.testing.assert_allclose(read_frfs(path).h[:, 0, 0], VALUES)
+    with pytest.warns(FileContentWarning, match=r"not read, no FRF: time history .* \(datasets 2, 5\)"):
+        np.testing.assert_allclose(read_frfs(path).h[:, 0, 0], VALUES)
     path.write_bytes(b"".join(others))
     assert "holds 1 time history" in refused(path)
     path = tmp_path / "mixed.mat"
     signal = structure_of_testlab(GIVEN, type_="Signal", values=GIVEN.h.real)
     write_mat(path, Signal=signal, FRF=structure_of_testlab(GIVEN, label="m/s^2/N"), text="März", n=3)
-    np.testing.assert_array_equal(read_frfs(path).h, GIVEN.h)
+    with pytest.warns(FileContentWarning, match=r"not read, no FRF: functions \(1 of type Signal\)"):
+        np.testing.assert_array_equal(read_frfs(path).h, GIVEN.h)
     assert "holds no FRF" in refused(write_mat(path, Signal=signal))
     assert "has no field for the frequencies" in refused(write_mat(path, text="März", n=3))
 
@@ -418,3 +420,43 @@ def test_no_file_of_any_kind_is_waited_for(tmp_path):
         os.mkfifo(pipe)
         with pytest.raises(FileContentError, match="is a pipe or a device, not a file"):
             read(pipe, "") if read is read_matrix else read(pipe)
+
+
+@pytest.mark.parametrize(
+    "name", ["freq_hz", "h", "responses", "quantity", "unit", "coherence", "nodes", "jointfrf_frfs"]
+)
+@pytest.mark.parametrize("layout", [1, 2])
+def test_a_group_in_place_of_a_dataset_is_one_sentence(tmp_path, name, layout):
+    """In the own layout, and in arrays of scripts."""
+    path = tmp_path / "a.h5"
+    write_hdf5(path, full_set())
+    with h5py.File(path, "r+") as file:
+        if layout == 1:
+            del file["sha256"]
+            file["jointfrf_frfs"][()] = 1
+        del file[name]
+        file.create_group(name)["inside"] = [1.0, 2.0]
+    assert f"{name} is a group, not an array; write the file again" in refused(path)
+
+
+def test_a_group_that_someone_added_is_damage_or_no_harm(tmp_path):
+    path = tmp_path / "a.h5"
+    write_hdf5(path, full_set())
+    with h5py.File(path, "r+") as file:
+        file.create_group("notes")["inside"] = [1.0, 2.0]
+    assert "was edited: its content does not fit its field sha256" in refused(path)
+    with h5py.File(path, "r+") as file:
+        del file["sha256"]
+        file["jointfrf_frfs"][()] = 1
+    np.testing.assert_array_equal(read_frfs(path).h, full_set().h)
+
+
+def test_a_group_named_by_a_mapping_is_one_sentence(tmp_path):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        for name, value in FIELDS.items():
+            file[name] = np.char.encode(value, "utf-8") if isinstance(value, list | str) else value
+        file["test/a"], file["test/b"] = GIVEN.h, GIVEN.h
+    np.testing.assert_array_equal(read_frfs(path, mapping={"h": "test.a"}).h, GIVEN.h)
+    with pytest.raises(FileContentError, match=r"test is a group; use one of test\.a, test\.b"):
+        read_frfs(path, mapping={"h": "test"})

@@ -1,12 +1,23 @@
 """FRFs come back from every format: as written here, and as other programs write them."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from frf_files import FREQ_HZ, frf_set, full_set, names, structure_of_testlab, write_mat, write_mat73, write_sdynpy
-from jointfrf.errors import FileContentError
+from frf_files import (
+    FIELDS,
+    FREQ_HZ,
+    frf_set,
+    full_set,
+    names,
+    structure_of_testlab,
+    write_mat,
+    write_mat73,
+    write_sdynpy,
+)
+from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.io import FrfMapping, frfs_of_arrays, read_frfs, write_csv, write_hdf5, write_npz, write_uff
 
 pytest.importorskip("h5py")
@@ -102,11 +113,11 @@ def test_a_mapping_says_which_field_is_what(tmp_path, write):
     with pytest.raises(FileContentError, match="the FRFs have no unit; give unit="):
         read_frfs(path, quantity="mobility", mapping=mapping)
     same(read_frfs(path, mapping=mapping, unit="m/s/N"), given, rtol=1e-12)
-    with pytest.raises(FileContentError, match=r"no field for the FRFs .*: say which of .*test\.A"):
+    with pytest.raises(FileContentError, match=r"no field for the FRFs; give mapping h=... out of .*test\.A"):
         read_frfs(path)
-    with pytest.raises(FileContentError, match=r"no field 'test\.C'; it has .*test\.B"):
+    with pytest.raises(FileContentError, match=r"no field 'test\.C'; use one of .*test\.B"):
         read_frfs(path, mapping={"h": "test.C"})
-    with pytest.raises(ValueError, match=r"mapping names 'axis', which is none of .*; did you mean axes"):
+    with pytest.raises(ValueError, match=r"unknown field 'axis' in mapping; use one of .*; did you mean axes"):
         read_frfs(path, mapping={"axis": "freq,out,in"})
     found = read_frfs(path, unit="m/s/N", mapping=FrfMapping(**(mapping | {"h": "test.B"})))
     assert found.h[0, 0, 0] == 2 * given.h[0, 0, 0]
@@ -120,7 +131,10 @@ def test_a_mapping_says_which_field_is_what(tmp_path, write):
         ({"f": np.ones((2, 2))}, r"frequencies have shape \(2, 2\)"),
         ({"f": "text"}, "frequencies are not numbers"),
         ({"H": "text"}, "FRFs are not numbers"),
-        ({"responses": ["101:x", "left", "103:z"]}, "has 'left' in its responses: expected a point and a direction"),
+        (
+            {"responses": ["101:x", "left", "103:z"]},
+            "has 'left' in its responses; name a node and a direction, such as",
+        ),
         ({"responses": ["101:x", "101:x", "103:z"]}, r"names 101:\+x twice in its responses"),
         ({"responses": np.array([[101, 1], [102, -2], [103, 9]])}, "node 103 with direction code 9"),
         ({"unit": "furlong"}, "the unit 'furlong' is not understood; give unit="),
@@ -128,10 +142,10 @@ def test_a_mapping_says_which_field_is_what(tmp_path, write):
         ({"quantity": "mobility"}, r"the unit 'm/s\^2/N' does not fit mobility"),
         ({"coherence": np.full((5, 3, 2), 2.0)}, "coherence must be from 0 to 1"),
         ({"averages": 0.5}, "averages must be 1 or more"),
-        ({"FRF": np.ones((5, 3, 2))}, r"several fields for h: say which of H, FRF by mapping"),
+        ({"FRF": np.ones((5, 3, 2))}, r"several fields for h; give mapping h=... out of H, FRF"),
         (
-            {"H": np.where(np.arange(30).reshape(5, 3, 2) == 8, np.inf, 1)},
-            r"102:-y / 101:\+x holds NaN or Inf, first at 20",
+            {"H": np.where(np.arange(30).reshape(5, 3, 2) < 6, np.inf, 1)},
+            "left out: NaN or Inf on 1 of 5 lines, first at 10",
         ),
     ],
 )
@@ -172,7 +186,8 @@ def test_structures_of_testlab(tmp_path, write):
         Coherence=structure_of_testlab(given, label="", type_="Coherence", values=coherence),
         Signal=structure_of_testlab(given, label="g", type_="Signal", values=coherence),
     )
-    found = read_frfs(path)
+    with pytest.warns(FileContentWarning, match=r"not read, no FRF: functions \(1 of type Signal\)"):
+        found = read_frfs(path)
     same(found, given)
     np.testing.assert_array_equal(found.coherence, coherence)
     assert found.stated == "FRFs of an unnamed quantity [m N^-1 s^-2]"
@@ -235,6 +250,194 @@ def test_a_damaged_structure_of_structure_of_testlab(tmp_path, part, key, value,
         read_frfs(write_mat(tmp_path / "a.mat", FRF=record))
 
 
+def one_by_one(given, **changes):
+    """Structures of Testlab, one for each FRF of a set: what `changes` maps to None is left out of a channel."""
+    found = {}
+    for i, response in enumerate(given.responses):
+        for j, excitation in enumerate(given.excitations):
+            single = replace(
+                given, responses=(response,), excitations=(excitation,), h=given.h[:, i : i + 1, j : j + 1]
+            )
+            record = structure_of_testlab(single, label="m/s^2/N", type_=changes.get("type", "FRF"))
+            for key in ("primary_channel", "reference_channel"):
+                for name in [name for name, value in changes.items() if value is None]:
+                    del record["function_record"][key][name]
+            found[f"F{i}{j}"] = record
+    return found
+
+
+@pytest.mark.parametrize("write", [write_mat, write_mat73])
+def test_only_functions_of_the_right_type_are_read(tmp_path, write):
+    """A complex spectrum and an auto-power are no FRFs, wherever they stand among these."""
+    given = frf_set()
+    spectrum = structure_of_testlab(given, label="m/s^2", type_="FrequencySpectrum")
+    power = structure_of_testlab(given, label="(m/s^2)^2", type_="AutoPower Spectrum", values=abs(given.h))
+    multiple = structure_of_testlab(given, label="", type_="Multiple Coherence", values=np.full(given.h.shape, 0.5))
+    path = write(tmp_path / "a.mat", A=spectrum, **one_by_one(given), Z=power, M=multiple)
+    left_out = "1 of type FrequencySpectrum, 1 of type Multiple Coherence, 1 of type AutoPower Spectrum"
+    with pytest.warns(FileContentWarning, match=r"not read, no FRF: functions") as warned:
+        found = read_frfs(path)
+    same(found, given)
+    assert found.coherence is None
+    assert {each.strip("()") for each in str(warned[0].message).partition("functions ")[2].split(", ")} == {
+        each.strip("()") for each in left_out.split(", ")
+    }
+    with pytest.raises(
+        FileContentError, match=r"holds no FRF, but functions \(1 of type FrequencySpectrum\); export FRFs"
+    ):
+        read_frfs(write(tmp_path / "b.mat", A=spectrum))
+
+
+@pytest.mark.parametrize("write", [write_mat, write_mat73])
+def test_functions_without_directions_or_names(tmp_path, write):
+    given = frf_set()
+    path = write(tmp_path / "a.mat", **one_by_one(given, direction=None))
+    with pytest.raises(
+        FileContentError, match=r"has no direction of node 101 in its responses; give mapping direction=z"
+    ):
+        read_frfs(path)
+    found = read_frfs(path, mapping={"direction": "z"})
+    assert names(found.responses) == ["101:+z", "102:+z", "103:+z"]
+    np.testing.assert_array_equal(found.h, given.h)
+    pairs = [(str(one), str(other)) for one in given.responses for other in given.excitations]
+    in_order = {"responses": [pair[0] for pair in pairs], "excitations": ",".join(pair[1] for pair in pairs)}
+    same(read_frfs(path, mapping=in_order), given)
+    nameless = write(tmp_path / "b.mat", **one_by_one(given, direction=None, label=None))
+    same(read_frfs(nameless, mapping=in_order), given)
+    with pytest.raises(
+        FileContentError, match=r"give mapping responses=\.\.\., one name for each of 6, or one for all"
+    ):
+        read_frfs(nameless)
+    with pytest.raises(FileContentError, match=r"holds 6 functions of a kind, and mapping responses= has 2 names"):
+        read_frfs(nameless, mapping={"responses": "1:x,2:x", "excitations": "1:x"})
+
+
+def test_components_of_labels_are_told_apart(tmp_path):
+    given = frf_set()
+    labels = {"responses": ["frame:1:x", "arm:1:x", "arm:2:x"], "excitations": ["frame:1:x", "arm:2:x"]}
+    path = write_mat(tmp_path / "a.mat", **(FIELDS | labels))
+    with pytest.raises(
+        FileContentError, match="node 1 in the components 'frame' and 'arm'; number them apart by mapping"
+    ):
+        read_frfs(path)
+    found = read_frfs(path, mapping={"components": "frame:0,arm:100"})
+    assert names((*found.responses, *found.excitations)) == ["1:+x", "101:+x", "102:+x", "1:+x", "102:+x"]
+    np.testing.assert_array_equal(found.h, given.h)
+
+
+def test_a_second_function_between_the_same_channels_is_compared(tmp_path):
+    given = frf_set()
+    path = write_mat(tmp_path / "a.mat", A=structure_of_testlab(given, label="m/s^2/N"),
+                     B=structure_of_testlab(replace(given, h=1.2 * given.h), label="m/s^2/N"))  # fmt: skip
+    with pytest.warns(
+        FileContentWarning, match=r"6 further FRFs .* left out, the first is used; they differ by up to 20 %"
+    ):
+        same(read_frfs(path), given)
+
+
+@pytest.mark.parametrize("write", [write_mat, write_mat73])
+def test_structure_arrays_by_path_and_index(tmp_path, write):
+    """As a controller of shakers exports them: magnitude and phase of each response, first line and spacing."""
+    given = frf_set()
+    column = given.h[:, :, 0]
+    held = [
+        {"force": column[:, i], "size": abs(column[:, i]), "angle": np.angle(column[:, i]), "f0": 10.0, "df": 10.0}
+        for i in range(3)
+    ]
+    path = tmp_path / "a.mat"
+    if write is write_mat:
+        array = np.array([tuple(one.values()) for one in held], dtype=[(name, object) for name in held[0]])
+        write_mat(path, FRdata={"ResponseControl": array})
+    else:
+        write_mat73(path, FRdata={"ResponseControl": held})
+    one, every = "FRdata.ResponseControl(3)", "FRdata.ResponseControl(:)"
+    common = {"excitations": "101:x", "unit": "m/s^2/N"}
+    single = common | {"responses": "103:z", "freq_hz": f"{one}.f0:{one}.df", "h": f"{one}.force"}
+    parts = {"h": None, "magnitude": f"{one}.size", "phase_rad": f"{one}.angle"}
+    for mapping in (single, single | parts, single | {"freq_hz": "10,20,30,40,50"}, single | {"freq_hz": "10:10:50"}):
+        found = read_frfs(path, mapping=mapping)
+        np.testing.assert_allclose(found.h[:, 0, 0], column[:, 2], rtol=1e-12)
+        assert names(found.responses) == ["103:+z"]
+        np.testing.assert_allclose(found.freq_hz, FREQ_HZ)
+    lines = {"freq_hz": "10:10", "responses": names(given.responses)}
+    found = read_frfs(path, mapping=common | lines | {"h": f"{every}.force"})
+    np.testing.assert_array_equal(found.h[:, :, 0], column)
+    pairs = {"responses": "1:x,1:x,2:x", "excitations": "1:x,2:x,1:x", "h": f"{every}.force"}
+    found = read_frfs(path, mapping=common | lines | pairs)
+    assert found.measured.tolist() == [[True, True], [True, False]]
+    np.testing.assert_array_equal(found.h[:, 0, 1], column[:, 1])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"h": "FRdata.R(4).force"}, r"it has no field 'FRdata\.R\(4\)\.force'; use one of FRdata\.R\(1\)\.force, "),
+        ({"h": "FRdata.R"}, r"FRdata\.R is a group; use one of FRdata\.R\(1\)\.force"),
+        ({"h": "FRdata.R(:).name"}, "the FRFs are not numbers"),
+        ({"h": "FRdata.R(:).none"}, r"FRdata\.R\(:\)\.none names no arrays of one size \(none\)"),
+        ({"freq_hz": "10:df"}, "'df' in mapping freq_hz= is neither a number nor a field with one number"),
+        ({"freq_hz": "10:0"}, "freq_hz=10:0 is not like 5:0.5, first frequency and spacing in Hz"),
+        ({"freq_hz": "10:-1"}, "freq_hz=10:-1 is not like 5:0.5"),
+        ({"freq_hz": "10:1e-9:1000"}, "are no whole number of lines of the named channels"),
+        ({"freq_hz": "10:10", "responses": "1:x,2:x"}, "5 values are no whole number of lines of the named channels"),
+        ({"h": None, "magnitude": "FRdata.R(1).size"}, "mapping names magnitude of the FRFs; give real= and imag="),
+        (
+            {"h": None, "magnitude": "FRdata.R(1).db", "phase_deg": "FRdata.R(1).size"},
+            "magnitudes are negative, -20; give linear values, not dB",
+        ),
+        (
+            {"h": None, "real": "FRdata.R(1).force", "imag": "FRdata.R(1).size"},
+            r"R\(1\)\.force holds no real numbers, which mapping real= takes",
+        ),
+    ],
+)
+def test_a_wrong_path_or_frequency_is_one_sentence(tmp_path, change, message):
+    values = np.arange(1, 6) * (1 + 1j)
+    rows = [(values, np.ones(5), np.full(5, -20.0), "a")] * 2
+    array = np.array(rows, dtype=[(name, object) for name in ("force", "size", "db", "name")])
+    path = write_mat(tmp_path / "a.mat", FRdata={"R": array})
+    mapping = {"h": "FRdata.R(1).force", "freq_hz": "10:10", "responses": "1:x", "excitations": "1:x", "unit": "m/N"}
+    assert read_frfs(path, mapping=mapping).h.size == 5
+    with pytest.raises(FileContentError, match=message):
+        read_frfs(path, mapping=mapping | change)
+
+
+@pytest.mark.parametrize("phase", ["phase_deg", "phase_rad"])
+def test_real_and_imaginary_parts_or_magnitude_and_phase(tmp_path, phase):
+    given = frf_set()
+    angle = np.angle(given.h, deg=phase == "phase_deg")
+    fields = {name: value for name, value in FIELDS.items() if name != "H"}
+    path = tmp_path / "a.npz"
+    np.savez(path, **fields, re=given.h.real, im=given.h.imag, m=abs(given.h), p=angle)
+    same(read_frfs(path, mapping={"real": "re", "imag": "im"}), given)
+    same(read_frfs(path, mapping={"magnitude": "m", phase: "p"}), given, rtol=1e-12)
+
+
+def test_arrays_without_names_ask_for_them(tmp_path):
+    path = write_mat(tmp_path / "a.mat", f=FREQ_HZ, FRF=frf_set().h)
+    ways = r"give mapping responses=\.\.\. and mapping excitations=\.\.\., such as 1:x,2:x"
+    with pytest.raises(FileContentError, match=rf"\(5 x 3 x 2\) have no names of responses and excitations; {ways}"):
+        read_frfs(path)
+
+
+def test_one_frf_that_is_not_finite_leaves_the_others(tmp_path):
+    given = frf_set()
+    h = given.h.copy()
+    h[2, 1, 1] = np.nan
+    path = write_mat(tmp_path / "a.mat", **(FIELDS | {"H": h}))
+    with pytest.warns(
+        FileContentWarning, match=r"FRF 102:-y / 201:\+y is left out: NaN or Inf on 1 of 5 lines, first at 30"
+    ):
+        found = read_frfs(path)
+    assert (~found.measured).sum() == 1
+    np.testing.assert_array_equal(found.h[:, 0], given.h[:, 0])
+    h = given.h.copy()
+    h[0] = np.nan
+    path = write_mat(tmp_path / "a.mat", **(FIELDS | {"H": h, "f": FREQ_HZ - 10}))
+    with pytest.warns(FileContentWarning, match=r"line at 0 Hz holds NaN or Inf in 101:\+x / 101:\+x, .* is left out"):
+        np.testing.assert_array_equal(read_frfs(path).h, given.h[1:])
+
+
 def test_functions_of_sdynpy(tmp_path):
     given = frf_set()
     path = write_sdynpy(tmp_path / "a.npz", given)
@@ -242,7 +445,7 @@ def test_functions_of_sdynpy(tmp_path):
     for quantity in (None, "accelerance"):
         with pytest.raises(FileContentError, match="the FRFs have no unit; give unit="):
             read_frfs(path, quantity=quantity)
-    with pytest.raises(FileContentError, match="functions of type 6 of sdynpy, not FRFs"):
+    with pytest.raises(FileContentError, match=r"functions of type 6 of sdynpy; save FRFs \(type 4\)"):
         read_frfs(write_sdynpy(tmp_path / "a.npz", given, function_type=6))
 
 
@@ -325,7 +528,7 @@ def test_forms_of_text_tables(tmp_path, content):
         ("1,2,90,0.5\n2,3,-180,1\n", "", "no table of numbers below its heading"),
         ("freq [Hz]", "# averages: many\nfreq [Hz]", "averages 'many' is not a number"),
         (",0.5", ",-0.5", "coherence must be from 0 to 1"),
-        ("2,3,-180,1", "2,nan,-180,1", "holds NaN or Inf, first at 2 Hz"),
+        ("2,3,-180,1", "2,nan,-180,1", "left out: NaN or Inf on 1 of 2 lines, first at 2 Hz"),
     ],
 )
 def test_a_wrong_text_table_is_one_sentence(tmp_path, old, new, message):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from jointfrf.errors import FileContentError, FileContentWarning
-from jointfrf.io import read_uff
+from jointfrf.io import read_frfs, read_uff
 from uff_writer import FREQ_HZ, VALUES, dataset, function, nodes_15, nodes_2411, system_2420, units
 
 DATA = Path(os.environ.get("JOINTFRF_TEST_DATA", Path(__file__).resolve().parents[4] / "shared" / "data"))
@@ -160,7 +160,7 @@ def test_an_unknown_data_type_needs_the_word_of_the_caller(write):
     with pytest.raises(FileContentError, match="the response has no unit"):
         read_uff(path, quantity="mobility")
     assert read_uff(path, unit="m/s/N").quantity == "mobility"
-    with pytest.raises(ValueError, match="quantity 'inertance'"):
+    with pytest.raises(ValueError, match="unknown quantity 'inertance'; use one of"):
         read_uff(path, quantity="inertance")
 
 
@@ -226,8 +226,11 @@ def test_coordinates_that_cannot_be_trusted_are_said(write):
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"response": (0, 2)}, r"names no response node \(node 0\) \(dataset 1\)"),
-        ({"reference": (1, 0)}, r"names no reference direction \(code 0\) \(dataset 1\)"),
+        (
+            {"response": (0, 2)},
+            r"names no response node \(node 0\); give mapping responses= and excitations= \(dataset 1\)",
+        ),
+        ({"reference": (1, 0)}, r"names no reference direction \(code 0\); give mapping direction=z \(dataset 1\)"),
         ({"numerator": (15, "Pa")}, r"pressure per excitation force, not motion per force \(dataset 1\)"),
         ({"values": VALUES.real, "number_type": 4}, "real numbers, without phase"),
         (
@@ -244,7 +247,8 @@ def test_a_function_that_is_no_usable_frf_is_left_out(write, wrong, message):
         with pytest.warns(FileContentWarning, match="FRF left out: it"):
             assert read_uff(write(function(**wrong), function())).h.shape == (3, 1, 1)
     else:
-        assert read_uff(write(function(**wrong), function())).h.shape == (3, 1, 1)
+        with pytest.warns(FileContentWarning, match=r"not read, no FRF: .* \(dataset 1\)"):
+            assert read_uff(write(function(**wrong), function())).h.shape == (3, 1, 1)
 
 
 @pytest.mark.parametrize(
@@ -255,7 +259,10 @@ def test_a_function_that_is_no_usable_frf_is_left_out(write, wrong, message):
         ({"number_type": 8}, "is damaged: ordinate data type 8 in dataset 1"),
         ({"freq_hz": [5.0, 5.0, 5.0], "even": False}, "do not increase"),
         ({"freq_hz": [-1.0, 0.0, 1.0]}, "do not increase from 0 Hz"),
-        ({"values": np.array([1.0, np.nan, 1.0 + 0j])}, r"NaN or Inf in dataset 1 \(1:\+y / 1:\+y\), first at 12 Hz"),
+        (
+            {"values": np.array([1.0, np.nan, 1.0 + 0j])},
+            r"no FRF that can be used: FRF 1:\+y / 1:\+y is left out: NaN or Inf on 1 of 3 lines, first at 12 Hz",
+        ),
     ],
 )
 def test_damage_is_named(write, wrong, message):
@@ -271,7 +278,7 @@ def test_numbers_in_a_foreign_binary_form_are_refused(write):
 def test_nan_at_0_hz_costs_that_line_only(write):
     bad = np.array([np.nan, 1.0 + 0j, 2.0])
     path = write(function(freq_hz=[0.0, 1.0, 2.0]), function(bad, freq_hz=[0.0, 1.0, 2.0], response=(2, 2)))
-    with pytest.warns(FileContentWarning, match=r"0 Hz holds NaN or Inf and is dropped \(dataset 2\)"):
+    with pytest.warns(FileContentWarning, match=r"0 Hz holds NaN or Inf in 2:\+y / 1:\+y and is left out"):
         frfs = read_uff(path)
     assert frfs.freq_hz.tolist() == [1.0, 2.0]
     assert np.isfinite(frfs.h).all()
@@ -284,10 +291,137 @@ def test_different_frequencies_are_refused(write):
 
 
 def test_the_first_of_two_equal_frfs_is_kept(write):
-    with pytest.warns(FileContentWarning, match=r"second FRF between the same channels is left out \(dataset 2\)"):
-        assert read_uff(write(function(), function(2 * VALUES))).h[0, 0, 0] == VALUES[0]
-    with pytest.raises(FileContentError, match=r"'A' / 'A' .*'B' / 'B' .*must be unique"):
-        read_uff(write(function(entities=("A", "A")), function(entities=("B", "B"))))
+    """Where they differ: by how much, which one is used, and which ones are not."""
+    differ = r"first is used.*differ by up to 50 % \(1:\+y / 1:\+y, dataset 1 is used\) \(datasets 2, 3\)"
+    with pytest.warns(FileContentWarning, match=differ):
+        assert read_uff(write(function(), function(0.9 * VALUES), function(1.5 * VALUES))).h[0, 0, 0] == VALUES[0]
+    with pytest.warns(FileContentWarning, match=r"first is used.*their values are the same \(dataset 2\)"):
+        read_uff(write(function(), function()))
+    longer = function(freq_hz=[10.0, 12.0, 14.0, 16.0], values=np.append(VALUES, 1.0))
+    with pytest.warns(FileContentWarning, match=r"left out: it has other frequency lines \(dataset 2\)"):
+        read_uff(write(function(), longer))
+
+
+def test_components_that_number_nodes_alike_are_told_apart(write):
+    """Also where only one FRF joins them, which would look like that of a driving point."""
+    pairs = [("frame", "frame"), ("frame", "arm"), ("arm", "frame"), ("arm", "arm")]
+    several = write(
+        *(function(factor * VALUES, entities=pair) for factor, pair in zip((1, 2, 3, 4), pairs, strict=True))
+    )
+    message = (
+        r"has node 1 in the components 'frame' and 'arm'; number them apart by mapping components=frame:0,arm:1000"
+    )
+    with pytest.raises(FileContentError, match=message):
+        read_uff(several)
+    apart = {"components": "frame:0,arm:1000"}
+    found = read_frfs(several, mapping=apart)
+    assert [str(each) for each in found.responses] == ["1:+y", "1001:+y"]
+    np.testing.assert_array_equal(found.h[0] / VALUES[0], [[1, 2], [3, 4]])
+    assert read_frfs(several, mapping={"components": {"frame": 0, "arm": 5}}, nodes=[6]).h[0, 0, 0] == 4 * VALUES[0]
+    with pytest.raises(FileContentError, match="node 1 in the components 'arm' and 'frame'"):
+        read_uff(write(function(entities=("arm", "frame"))))
+    assert read_frfs(write(function(entities=("arm", "hammer"))), mapping={"components": "arm:0,hammer:0"}).h.size == 3
+    with pytest.raises(FileContentError, match=r"has a component 'arm'; add it to mapping components=frame:0"):
+        read_frfs(several, mapping={"components": "frame:0"})
+    with pytest.raises(ValueError, match=r"components='frame' is not like components=frame:0,arm:1000"):
+        read_frfs(several, mapping={"components": "frame"})
+
+
+def test_coordinates_of_nodes_that_several_components_have_are_left_out(write):
+    pairs = [("frame", "frame"), ("frame", "arm")]
+    nodes = nodes_2411({1: (1.0, 2.0, 3.0), 2: (4.0, 5.0, 6.0)})
+    more = function(response=(2, 2), entities=("arm", "frame"))
+    path = write(units(1, 1), nodes, *(function(entities=pair) for pair in pairs), more)
+    with pytest.warns(FileContentWarning, match="coordinates of node 1 are left out: several components"):
+        found = read_frfs(path, mapping={"components": "frame:0,arm:1000"})
+    assert {node: place.tolist() for node, place in found.coordinates.items()} == {1002: [4.0, 5.0, 6.0]}
+
+
+def test_directions_and_names_that_the_file_lacks_are_stated_by_the_user(write):
+    path = write(*(function(i * VALUES, response=(i, 0), reference=(9, 0)) for i in (1, 2, 3)))
+    with pytest.raises(FileContentError, match=r"no response direction \(code 0\); give mapping direction=z"):
+        read_frfs(path)
+    found = read_frfs(path, mapping={"direction": "-z"})
+    assert [str(each) for each in (*found.responses, *found.excitations)] == ["1:-z", "2:-z", "3:-z", "9:-z"]
+    nameless = write(*(function(i * VALUES, response=(0, 0), reference=(0, 0)) for i in (1, 2, 3)))
+    found = read_frfs(nameless, mapping={"responses": "11:x,12:x,13:-y", "excitations": "11:x"})
+    assert [str(each) for each in (*found.responses, *found.excitations)] == ["11:+x", "12:+x", "13:-y", "11:+x"]
+    np.testing.assert_array_equal(found.h[0, :, 0], VALUES[0] * np.arange(1, 4))
+    with pytest.raises(FileContentError, match=r"holds 3 functions of a kind, and mapping responses= has 2 names"):
+        read_frfs(nameless, mapping={"responses": "11:x,12:x", "excitations": "11:x"})
+    with pytest.raises(ValueError, match=r"direction 'q' is none of .*; correct mapping direction="):
+        read_frfs(path, mapping={"direction": "q"})
+
+
+def head_and_numbers(content):
+    """Return the records before the numbers of a function, and the words of its numbers."""
+    lines = content.splitlines(keepends=True)
+    return b"".join(lines[:13]), b"".join(lines[13:-1]).split()
+
+
+@pytest.mark.parametrize("form", [{}, {"number_type": 5}, {"even": False}])
+@pytest.mark.parametrize("a_line", [1, 2, 3, 5, 7])
+def test_numbers_are_read_wherever_lines_are_cut(write, form, a_line):
+    """Four or six a line by the definition; programs put any number in a line, and an abscissa in 20 columns."""
+    head, words = head_and_numbers(function(**form))
+    rows = [b" ".join(word.rjust(20) for word in words[i : i + a_line]) for i in range(0, len(words), a_line)]
+    found = read_uff(write(head + b"\n".join(rows) + b"\n    -1\n"))
+    np.testing.assert_array_equal(found.h, read_uff(write(function(**form))).h)
+    np.testing.assert_array_equal(found.freq_hz, FREQ_HZ)
+
+
+def test_zeros_that_fill_the_last_line_are_no_values(write):
+    """Seven values, three a line in single precision."""
+    values = np.arange(1, 8) * (1.0 + 1j)
+    content = function(values, freq_hz=np.arange(1.0, 8.0), number_type=5)
+    zeros = b"".join([b"%13.5e" % 0.0] * 2)
+    filled = content.removesuffix(b"\n    -1\n") + 2 * zeros + b"\n    -1\n"
+    np.testing.assert_array_equal(read_uff(write(filled)).h[:, 0, 0], values)
+    one_more = filled.replace(2 * zeros + b"\n", zeros + zeros[:13] + b"%13.5e\n" % 1.0)
+    with pytest.raises(FileContentError, match="holds 9 of 7 values"):
+        read_uff(write(one_more))
+    with pytest.raises(FileContentError, match="holds 10 of 7 values"):
+        read_uff(write(content.removesuffix(b"    -1\n") + 3 * zeros + b"\n    -1\n"))
+
+
+@pytest.mark.parametrize(("first", "even"), [(0, True), (13, False), (20, False)])
+def test_numbers_that_touch_each_other_are_read_by_their_columns(write, first, even):
+    values = np.array([-1.5 - 1j, -2.0 - 4j, -3.25 - 6j]) * 1e-200
+    head, _ = head_and_numbers(function(values, even=even))
+    rows = [
+        ("" if even else f"{f:{first}.{first - 8}e}") + f"{v.real:20.12e}{v.imag:20.12e}"
+        for f, v in zip(FREQ_HZ, values, strict=True)
+    ]
+    assert all("-200-" in row for row in rows)
+    found = read_uff(write(head + "\n".join(rows).encode() + b"\n    -1\n"))
+    np.testing.assert_allclose(found.h[:, 0, 0], values, rtol=1e-12)
+    np.testing.assert_array_equal(found.freq_hz, FREQ_HZ)
+
+
+@pytest.mark.parametrize("word", [b"nan", b"1.#QNAN0e+000", b"-1.#IND00e+000", b"*************", b"Infinity"])
+def test_an_frf_that_is_not_finite_is_named_and_the_others_are_read(write, word):
+    bad = function(response=(2, 2)).replace(b"3.00000000000e+00", word.rjust(17))
+    with pytest.warns(
+        FileContentWarning, match=r"FRF 2:\+y / 1:\+y is left out: NaN or Inf on 1 of 3 lines, first at 12"
+    ):
+        found = read_uff(write(function(), bad))
+    assert found.measured.tolist() == [[True], [False]]
+
+
+@pytest.mark.parametrize("before", [b"", b"\xef\xbb\xbf", b"\n\n"])
+@pytest.mark.parametrize("delimiter", [b"    -1   ", b"-1", b"  -1\t", b"    -1" + 100 * b" "])
+@pytest.mark.parametrize("ending", [b"\n", b"\r\n", b"\r"])
+def test_delimiters_are_known_by_their_content(write, before, delimiter, ending):
+    content = function() + function(response=(2, 2))
+    path = write(before + content.replace(b"    -1\n", delimiter + b"\n").replace(b"\n", ending))
+    np.testing.assert_array_equal(read_frfs(path).h[:, 1, 0], VALUES)
+
+
+def test_records_in_free_columns(write):
+    """Numbers and names between blanks, wherever they stand."""
+    lines = function().decode().splitlines()
+    free = [" ".join(line.split()) if 6 < i < len(lines) - 1 else line for i, line in enumerate(lines)]
+    np.testing.assert_array_equal(read_uff(write("\n".join([*free, ""]))).h[:, 0, 0], VALUES)
 
 
 def test_a_file_cut_short_loses_its_last_dataset(write):
@@ -314,8 +448,8 @@ def test_a_lost_delimiter_is_noticed(write):
         (bytes(range(256)), "is not a Universal File"),
         (b"    -1\n    -1\n", "has no type"),
         (dataset(15).encode(), r"holds dataset 15 \(nodes\) and no FRF"),
-        (dataset(58).encode(), r"dataset 1 \(type 58\) cannot be read"),
-        (dataset(164, "x").encode() + function(), r"dataset 1 \(type 164\) cannot be read"),
+        (dataset(58).encode(), r"dataset 1 \(type 58\): it cannot be read"),
+        (dataset(164, "x").encode() + function(), r"dataset 1 \(type 164\): it cannot be read"),
         (function() + units(0.0, 1.0).encode(), r"test.uff has the length factor 0 in its units \(dataset 2\)"),
         (units(0.0, 1.0).encode() + function(), r"test.uff has the length factor 0 in its units \(dataset 1\)"),
     ],
@@ -334,7 +468,7 @@ def test_missing_files_and_folders(tmp_path):
 
 def test_a_number_that_is_none_is_damage(write):
     path = write(function().replace(b"1.00000000000e+00", b"1.00000x00000e+00"))
-    with pytest.raises(FileContentError, match=r"dataset 1 .* cannot be read"):
+    with pytest.raises(FileContentError, match=r"dataset 1 \(type 58\): line 14 of it is not numbers: '1.00000x00000e"):
         read_uff(path)
 
 

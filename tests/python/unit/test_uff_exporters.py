@@ -37,7 +37,7 @@ def test_every_form_is_read_rightly(tmp_path, name):
 def test_what_is_told_of_each_form(tmp_path):
     """Nothing where nothing was assumed."""
     expected = {
-        "several functions of a pair": "a second FRF between the same channels is left out",
+        "several functions of a pair": "between the same channels left out, the first is used",
         "LMS Test.Lab": "",
         "dataset 164 in mm": "",
     }

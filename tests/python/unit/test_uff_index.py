@@ -16,7 +16,7 @@ DELIMITER = b"    -1"
 
 def whole(content: bytes) -> tuple[list[tuple[int, int]], bool]:
     """Places of the datasets of a file without binary numbers."""
-    places = [match.start() for match in re.finditer(rb"(?:(?<=\n)|(?<=\r)|\A)    -1(?=[\r\n]|\Z| {74})", content)]
+    places = [match.start() for match in re.finditer(rb"(?:(?<=\n)|(?<=\r)|\A) {0,5}-1 *(?=[\r\n]|\Z)", content)]
     return list(zip(places[::2], places[1::2], strict=False)), len(places) % 2 == 1
 
 

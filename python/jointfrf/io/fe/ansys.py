@@ -51,7 +51,7 @@ ANSYS_FULL = MatrixFormat(
 
 
 #: ``(10I8)``, ``(1P,4D20.12)``: numbers of a line, and the width of each.
-_FORMAT = re.compile(r"\(\s*(?:\d+P,?)?\s*(\d*)\s*[IEDFG](\d+)(?:\.\d+)?(?:E\d+)?\s*\)", re.IGNORECASE)
+_FORMAT = re.compile(r"\(\s*+(?:\d+P,?\s*+)?(\d*)\s*+[IEDFG](\d++)(?:\.\d++)?(?:E\d++)?\s*+\)", re.IGNORECASE)
 #: Real, symmetric or not, assembled.
 _KIND = re.compile(rb"^R[SU]A\s", re.IGNORECASE)
 
