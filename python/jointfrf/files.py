@@ -61,12 +61,12 @@ def _limit_gb(given: float | None) -> float | None:
     except ValueError:
         limit = -1.0
     if not limit > 0:
-        raise FileContentError(f"the environment variable {LIMIT_VARIABLE} is {word!r}: it must be a number of GB")
+        raise FileContentError(f"the environment variable {LIMIT_VARIABLE} is {word!r}; set it to a number of GB")
     return limit
 
 
 #: How a message about the limit ends.
-_RAISED = f"limit_gb=, --limit-gb or the environment variable {LIMIT_VARIABLE} raises this limit"
+_RAISED = f"raise this limit by limit_gb=, --limit-gb or the environment variable {LIMIT_VARIABLE}"
 
 
 class ReadLimit:
@@ -104,7 +104,7 @@ class ReadLimit:
         if self._taken > self.bytes:
             raise FileContentError(
                 f"{self._path} states content of {self._taken / 1e9:.3g} GB or more, beyond the "
-                f"{self.bytes / 1e9:.3g} GB that a file may take: {_RAISED}"
+                f"{self.bytes / 1e9:.3g} GB that a file may take; {_RAISED}"
             )
 
 
@@ -127,13 +127,13 @@ def check_file(path: Path, limit_gb: float | None = None) -> None:
     if not path.exists():
         raise FileNotFoundError("\\n".join(f"there is no file {path}".splitlines()))
     if path.is_dir():
-        raise FileContentError(f"{path} is a folder, not a file")
+        raise FileContentError(f"{path} is a folder; name a file")
     if not path.is_file():
         # Opening a pipe waits for a writer; a device has no end.
-        raise FileContentError(f"{path} is a pipe or a device, not a file: save what it gives first")
+        raise FileContentError(f"{path} is a pipe or a device, not a file; save its content and name that file")
     limit, size = _limit_gb(limit_gb) or _LARGEST, path.stat().st_size / 1e9
     if size > limit:
-        raise FileContentError(f"{path} has {size:.3g} GB, more than the {limit:.3g} GB that are read: {_RAISED}")
+        raise FileContentError(f"{path} has {size:.3g} GB, more than the {limit:.3g} GB that are read; {_RAISED}")
 
 
 def head_of(path: Path, limit_gb: float | None = None) -> bytes:
@@ -189,7 +189,7 @@ def damage_named(path: Path, kind: str, *others: type[Exception]) -> Iterator[No
     except FileContentError:
         raise
     except _DAMAGE + others as error:
-        raise FileContentError(f"{path} cannot be read as {kind}: {first_line(error)}") from error
+        raise FileContentError(f"{path} cannot be read as {kind}: {first_line(error)}; write it again") from error
 
 
 def text_of(path: Path) -> str:
@@ -211,7 +211,7 @@ def text_of(path: Path) -> str:
         return content.decode("utf-16" if is_wide else "utf-8-sig")
     except UnicodeDecodeError as error:
         if is_wide or b"\0" in content:
-            raise FileContentError(f"{path} is not a text file") from error
+            raise FileContentError(f"{path} is not a text file; save text in UTF-8") from error
         return content.decode("latin-1")
 
 
@@ -248,7 +248,7 @@ def below(folder: Path, name: str, suffix: str = "") -> Path:
         clean += f"-{zlib.crc32(name.encode('utf-8', 'surrogatepass')):08x}"
     path = folder / f"{clean}{suffix}"
     if path.resolve().parent != folder.resolve():
-        raise FileContentError(f"{path} is a link out of its folder: remove it, what it leads to is not written")
+        raise FileContentError(f"{path} is a link out of its folder, to which nothing is written; remove it")
     return path
 
 

@@ -246,7 +246,7 @@ def _in_order(what: str, values: Any, axes: str, shape: tuple[int, int, int]) ->
         raise ValueError(f"the {what} have the sizes {held}, which do not fit {wanted}{hint}")
     if any(not np.array_equal(fitting[0], other, equal_nan=True) for other in fitting[1:]):
         raise ValueError(
-            f"which axis of the {what} is frequency is not clear from the sizes: give axes=, such as freq,out,in"
+            f"which axis of the {what} is frequency is not clear from the sizes; give axes=, such as freq,out,in"
         )
     return np.ascontiguousarray(fitting[0])
 
@@ -254,7 +254,7 @@ def _in_order(what: str, values: Any, axes: str, shape: tuple[int, int, int]) ->
 def _order(axes: str) -> list[int]:
     names = [name.strip() for name in str(axes).split(",")]
     if sorted(names) != sorted(_AXES):
-        raise ValueError(f"axes {axes!r} are not freq, out and in, in their order, such as out,in,freq")
+        raise ValueError(f"axes {axes!r} do not name freq, out and in; give them in their order, such as out,in,freq")
     return [_AXES.index(name) for name in names]
 
 

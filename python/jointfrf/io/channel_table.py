@@ -103,7 +103,7 @@ def read_channel_table(path: str | PathLike[str]) -> tuple[ChannelPlace, ...]:
         return _places_of(read_keys(read_toml(file), ChannelTableKeys))
     found = tuple(place for row in _csv_rows(file) for place in _places(row))
     if not found:
-        raise FileContentError(f"{file} holds no channels")
+        raise FileContentError(f"{file} has no channels; add a row for each")
     return found
 
 
@@ -125,7 +125,7 @@ def _csv_rows(file: Path) -> Iterator[ChannelKeys]:
     columns = [_column(file, word) for word in table.heading]
     names = [name for name, _ in columns]
     if len(set(names)) < len(names):
-        raise FileContentError(f"{file}: a column is named twice: {', '.join(names)}")
+        raise FileContentError(f"{file}: a column is named twice ({', '.join(names)}); leave one out")
     for where, cells in table.rows:
         given = {name: cell for name, cell in zip(names, cells, strict=True) if cell}
         yield read_keys(TomlTable(_csv_values(table, where, given, dict(columns)), where), ChannelKeys)
@@ -137,14 +137,12 @@ def _column(file: Path, word: str) -> tuple[str, float]:
     name = match[1].lower() if match else word.strip()
     if name not in _COLUMNS or match is None:
         hint = did_you_mean(name, _COLUMNS)
-        raise FileContentError(f"{file}: unknown column {one_line(name)}; use {', '.join(_COLUMNS)}{hint}")
+        raise FileContentError(f"{file}: unknown column {one_line(name)}; use one of {', '.join(_COLUMNS)}{hint}")
     if match[2] is None:
         return name, 1.0
     unit = parse_unit(match[2])
     if name not in ("x", "y", "z") or unit is None or unit.exponents != (1, 0, 0):
-        raise FileContentError(
-            f"{file}: column {one_line(word.strip())}: only x, y, z have a unit, such as m, mm or in"
-        )
+        raise FileContentError(f"{file}: column {one_line(word.strip())}: only x, y, z have a unit, such as mm or in")
     return name, unit.to_si
 
 
@@ -165,7 +163,7 @@ def _csv_values(table: TextTable, where: str, given: Mapping[str, str], scales: 
         there = [name for name in names if name in given]
         if there and len(there) < 3:
             missing = next(name for name in names if name not in given)
-            raise FileContentError(f"{where}: {there[0]} is given, {missing} is not")
+            raise FileContentError(f"{where}: {there[0]} is given without {missing}; add {missing}")
         if there:
             values[vector] = [number(name) * scales[name] for name in names]
     if "node" in given:
@@ -179,11 +177,11 @@ def _places(row: ChannelKeys, unit: float = 1.0) -> list[ChannelPlace]:
     """Return the channels that a table names, whose positions are in this unit, m."""
     where, at = row.table.where, None if row.at is None else unit * np.array(row.at)
     if (row.channel is None) == (row.node is None):
-        raise FileContentError(f"{where}: either channel or node must be named")
+        raise FileContentError(f"{where}: name either channel or node")
     if row.direction is not None and row.node is not None:
-        raise FileContentError(f"{where}: direction goes with channel; the directions of a node are axes")
+        raise FileContentError(f"{where}: direction belongs to a channel; give axes of the node")
     if row.axes is not None and row.channel is not None:
-        raise FileContentError(f"{where}: axes go with node; the direction of a channel is direction")
+        raise FileContentError(f"{where}: axes belong to a node; give direction of the channel")
     if row.channel is not None:
         channel = row.build(partial(Channel.parse, row.channel))
         direction = None if row.direction is None else _unit(row, "direction", row.direction)

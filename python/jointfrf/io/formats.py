@@ -45,14 +45,14 @@ FORMATS = tuple(map(_format_of, _MODULES))
 #: Entry points by which other packages add formats; they are looked at where a file is of none of the above.
 _PLUGINS = "jointfrf.formats"
 #: Why a pickle is an error.
-_PICKLE = "is a pickle, which is not read because that can run any program: save an NPZ file"
+_PICKLE = "is a pickle, which could run any program; save an NPZ file"
 #: What to do with files of LabVIEW.
 _FRFS_WANTED = ", which is not read; export its FRFs as a Universal File or CSV"
 #: First bytes of files that are not read, and what the user can do.
 _OTHERS = (
-    (b"\x93NUMPY", "is an NPY file, one array without frequencies: save an NPZ file, or use frfs_of_arrays"),
+    (b"\x93NUMPY", "is an NPY file, one array without frequencies; save an NPZ file, or use frfs_of_arrays"),
     *((b"\x80" + bytes([protocol]), _PICKLE) for protocol in (2, 3, 4, 5)),
-    (b"\x1f\x8b", "is compressed by gzip: unpack it"),
+    (b"\x1f\x8b", "is compressed by gzip; unpack it"),
     (b"TDSm", f"is a TDMS file of LabVIEW{_FRFS_WANTED}"),
     (b"LabVIEW Measurement", f"is an LVM file of LabVIEW{_FRFS_WANTED}"),
 )
@@ -79,7 +79,7 @@ def check_suffix(path: str | PathLike[str]) -> FileFormat:
         return written[suffix]
     found, broken = _of_plugin(lambda each: each.write is not None and suffix in each.suffixes)
     if found is None:
-        raise ValueError(f"{path} has no suffix of a format that is written: {', '.join(written)}{broken}")
+        raise ValueError(f"{path} has no suffix of a format that is written; use one of {', '.join(written)}{broken}")
     return found
 
 
@@ -263,6 +263,6 @@ def _detected(path: Path, head: bytes) -> FileFormat:
     if found is None:
         found, broken = _of_plugin(lambda each: each.has_mark(head) or each.looks_alike(path, head))
     if found is None:
-        refusal = refusal or f"is of an unknown format; known are {format_names()}"
+        refusal = refusal or f"is of an unknown format; use one of {format_names()}"
         raise FileContentError(f"{path} {refusal}{broken}")
     return found

@@ -73,12 +73,14 @@ class _Hdf5:
         self.size = path.stat().st_size
 
     def elsewhere(self, name: str) -> FileContentError:
-        return FileContentError(f"{self.path} takes {name!r} from another file, which is not read: copy it there")
+        return FileContentError(
+            f"{self.path} takes {name!r} from another file, which is not read; copy it into this one"
+        )
 
     def group(self, group: Any, depth: int) -> Any:
         """Return the members of a group; those of a structure array of MATLAB as a list of structures."""
         if depth > _DEEPEST:
-            raise FileContentError(f"{self.path} has groups inside groups without end")
+            raise FileContentError(f"{self.path} has groups inside groups without end; write it again")
         items = {name: self.opened(group, name) for name in group if not name.startswith("#")}
         found = {name: self.value(item, depth) for name, item in items.items()}
         lengths = {len(value) if isinstance(value, list) else -1 for value in found.values()}
@@ -96,7 +98,7 @@ class _Hdf5:
         if not isinstance(link, self.h5py.SoftLink):
             return group[name]
         if links > _MOST_LINKS:
-            raise FileContentError(f"{self.path} has links to links without end")
+            raise FileContentError(f"{self.path} has links to links without end; write it again")
         found = group.file if link.path.startswith("/") else group
         for part in link.path.split("/"):
             if part in ("", "."):
@@ -144,7 +146,7 @@ class _Hdf5:
         if item.nbytes > _MOST_COMPRESSED * self.size or (item.compression is None and item.nbytes > self.size):
             size = " x ".join(map(str, item.shape))
             raise FileContentError(
-                f"{self.path} is damaged: {item.name} does not hold the {size} values that it states"
+                f"{self.path} is damaged: {item.name} does not hold the {size} values that it states; write it again"
             )
         self.limit.take(max(item.nbytes, item.size))
         filters = [settings.get_filter(number)[0] for number in range(settings.get_nfilters())]
@@ -166,7 +168,9 @@ class _Hdf5:
                 if first < 0 or mask >> first & 1:
                     continue
                 if len(zlib.decompressobj().decompress(packed, chunk + 5)) > chunk + 4:
-                    raise FileContentError(f"{self.path} is damaged: {item.name} decompresses to more than it states")
+                    raise FileContentError(
+                        f"{self.path} is damaged: {item.name} decompresses to more than it states; write it again"
+                    )
 
     def matlab(self, item: Any, name: str) -> str:
         """Return a short attribute as a text; a longer one, or of variable length, is not MATLAB's."""
@@ -224,7 +228,7 @@ def hdf5_texts(h5py: Any, item: Any, path: Path, limit: ReadLimit) -> list[str]:
         They take more than the limit.
     """
     if item.file.id.get_create_plist().get_sizes() != (8, 8):
-        raise ValueError("its texts are stored in an unusual way: save texts of a fixed length")
+        raise ValueError("its texts are stored in an unusual way, not with a fixed length")
     limit.take(100 * item.size)
     found, taken = [], 0
     with path.open("rb") as file:
@@ -251,7 +255,7 @@ def _places(h5py: Any, item: Any, file: BinaryIO) -> NDArray[Any]:
             raise ValueError("its texts lie beyond its end")
         return np.frombuffer(held, _PLACE).reshape(places.shape)
     if layout != h5py.h5d.CHUNKED:
-        raise ValueError("its texts are stored in an unusual way: save texts of a fixed length")
+        raise ValueError("its texts are stored in an unusual way, not with a fixed length")
     filters = [settings.get_filter(number)[0] for number in range(settings.get_nfilters())]
     for number in range(item.id.get_num_chunks()):
         corner = item.id.get_chunk_info(number).chunk_offset
@@ -274,7 +278,7 @@ def _unfiltered(packed: bytes, mask: int, filters: list[int], size: int) -> byte
         elif filters[number] == _SHUFFLE:
             packed = np.frombuffer(packed, "u1").reshape(_PLACE.itemsize, -1).T.tobytes()
         else:
-            raise ValueError("its texts are compressed in an unusual way: save texts of a fixed length")
+            raise ValueError("its texts are compressed in an unusual way, not with a fixed length")
     if len(packed) != size:
         raise ValueError("its texts are damaged")
     return packed

@@ -47,7 +47,7 @@ class ChannelNamer:
         found = tuple(self.channel(what, label) for label in _listed(labels))
         twice = next((channel for channel, count in Counter(found).items() if count > 1), None)
         if twice is not None:
-            raise ValueError(f"names {twice} twice in its {what}")
+            raise ValueError(f"names {twice} twice in its {what}; leave one out")
         return found
 
     def channel(self, what: str, label: Any) -> Channel:
@@ -197,7 +197,5 @@ def _axis(what: str, row: int, direction: NDArray[np.float64]) -> str:
     rest = np.delete(direction, largest)
     if not (np.isfinite(direction).all() and abs(rest).max() <= _ALONG * abs(direction[largest]) != 0.0):
         way = ", ".join(f"{x:g}" for x in direction)
-        raise ValueError(
-            f"row {row} of the {what} points along ({way}), not along an axis: `virtual_point` takes any direction"
-        )
+        raise ValueError(f"row {row} of the {what} points along ({way}), not along an axis; use `virtual_point` for it")
     return ("-" if direction[largest] < 0 else "+") + "xyz"[largest]

@@ -49,13 +49,14 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path, limit: R
         shape, _, dtype = read(member)
         if dtype.hasobject:
             raise FileContentError(
-                f"{path} holds Python objects ({info.filename}), which are not read because that can run any program: "
-                "save plain arrays"
+                f"{path} holds Python objects ({info.filename}), which could run any program; save plain arrays"
             )
         count = int(np.prod(shape, dtype=object))
         if info.file_size != member.tell() + dtype.itemsize * count:
             size = " x ".join(map(str, shape))
-            raise FileContentError(f"{path} is damaged: {info.filename} does not hold the {size} values that it states")
+            raise FileContentError(
+                f"{path} is damaged: {info.filename} has not the {size} values that it states; write it again"
+            )
         limit.take(max(dtype.itemsize, 1) * count)
     with archive.open(info) as member:
         return np.asarray(np.lib.format.read_array(member, allow_pickle=False))

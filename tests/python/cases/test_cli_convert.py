@@ -71,7 +71,10 @@ def test_several_files_become_one(tmp_path):
     ("words", "message"),
     [
         ([BARS], "name the files to read, and last the one to write"),
-        ([BARS, "out.xlsx"], "out.xlsx has no suffix of a format that is written: .uff, .unv, .npz, .h5, .hdf5, .csv"),
+        (
+            [BARS, "out.xlsx"],
+            "out.xlsx has no suffix of a format that is written; use one of .uff, .unv, .npz, .h5, .hdf5, .csv",
+        ),
         ([BARS, "nowhere/out.npz"], "there is no folder nowhere"),
         ([BARS, BARS], "two_bars.uff is one of the files to read"),
         ([BARS, "a.npz", "--map", "H=A"], "'H=A' is not FIELD=NAME with a field out of freq_hz, h"),

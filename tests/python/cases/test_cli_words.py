@@ -321,10 +321,10 @@ def test_paths_through_a_link_mean_what_the_system_means(tmp_path, monkeypatch):
         ({}, ["--unit", "V"], "argument --unit: unit 'V' of frf is not understood; use motion per force, such as g/N"),
         ({"unit": "m/N"}, ["--quantity", "mobility"], "leave --quantity out, or say --force-quantity"),
         ({"h": np.ones((2, 2, 2)), "freq_hz": [1.0, 2.0], "more": 1}, [], "give --map axes=, such as freq,out,in"),
-        ({"y": 1}, [], "has several fields for h: say which of h, y by --map"),
-        ({"responses": None}, [], "the responses are not named: give them, such as 102:+y"),
+        ({"y": 1}, [], "has several fields for h; give --map h=... out of h, y"),
+        ({"responses": None}, [], "have no names of responses; give --map responses=..., such as 1:x,2:x"),
         ({}, ["--map", "axis=3"], "'axis=3' is not FIELD=NAME with a field out of"),
-        ({}, ["--limit-gb", "1e-9"], ": --limit-gb or the environment variable"),
+        ({}, ["--limit-gb", "1e-9"], "raise this limit by --limit-gb or the environment variable"),
     ],
 )
 def test_messages_speak_of_options(tmp_path, fields, words, message):
@@ -575,7 +575,7 @@ def test_the_limit_of_what_is_read_is_an_option(tmp_path, monkeypatch):
     monkeypatch.delenv("JOINTFRF_FILE_LIMIT_GB", raising=False)
     result = run_command("check", BARS, "--limit-gb", "1e-6")
     assert result.returncode == 1
-    assert "more than the 1e-06 GB that are read: --limit-gb or the environment" in result.stderr
+    assert "more than the 1e-06 GB that are read; raise this limit by --limit-gb or the environment" in result.stderr
     assert "must be a number of GB above 0, not '0'" in run_command("check", BARS, "--limit-gb", "0").stderr
     assert main(["check", str(BARS), "--limit-gb", "1e-6", "--quiet"]) == 1
     assert "JOINTFRF_FILE_LIMIT_GB" not in os.environ

@@ -73,14 +73,18 @@ def test_commas_tabs_and_inches(tmp_path):
         ('side = "k"', 'side = "l"', "side must be one of j, k, not 'l'"),
         ('role = "excitation"', 'role = "exitation"', "did you mean excitation"),
         ('channel = "201:+x"', 'channel = "201:+w"', "'201:.w' is no channel"),
-        ('channel = "201:+x"', "", "either channel or node must be named"),
+        ('channel = "201:+x"', "", "name either channel or node"),
         ('channel = "201:+x"', "node = 0", "node must be a whole number, at least 1"),
         ("weight = 2", "weight = -2", "weight must be a number, at least 0"),
         ("weight = 2", "wieght = 2", "unknown key 'wieght'.*did you mean 'weight'"),
         ("at = [10, 20, 30]", "at = [10, 20]", "at must be three numbers"),
         ("direction = [0.0, 0.6, -0.8]", "direction = [0.0, 0.6, -0.9]", "direction must have length 1, not 1.08"),
         ("axes = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]", "axes = [[0, 1, 0]]", "axes must be three lists"),
-        ("axes = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]", "direction = [0, 0, 1]", "the directions of a node are axes"),
+        (
+            "axes = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]",
+            "direction = [0, 0, 1]",
+            "direction belongs to a channel; give axes of the node",
+        ),
         ('unit = "mm"', 'unit = "km"', "unit must be one of m, mm, cm, in"),
         ('unit = "mm"', 'units = "mm"', "unknown key 'units'"),
         ("[[channel]]", "[[channels]]", "unknown key 'channels'.*did you mean 'channel'"),
@@ -103,7 +107,7 @@ def test_what_is_wrong_in_toml(tmp_path, old, new, message):
         ("role;x", "node;x", "a column is named twice"),
         ("0,6", "a", "line 4: direction_y must be a number, not 'a'"),
         ("0,6;-0,8;2", "0,6;-0,8", "line 4 has 10 columns, the heading has 11"),
-        ("10;20;30", "10;;30", "line 4: x is given, y is not"),
+        ("10;20;30", "10;;30", "line 4: x is given without y; add y"),
         (";101;", ";1.5;", "line 3: node must be a whole number"),
         ("-0,8;2", "-0,8;-2", "line 4: weight must be a number, at least 0"),
     ],
@@ -119,7 +123,7 @@ def test_files_that_are_no_tables(tmp_path):
         read_channel_table(tmp_path / "none.csv")
     with pytest.raises(FileContentError, match="is empty"):
         read_channel_table(written(tmp_path, "\n# only this\n", "a.csv"))
-    with pytest.raises(FileContentError, match="holds no channels"):
+    with pytest.raises(FileContentError, match="has no channels; add a row for each"):
         read_channel_table(written(tmp_path, "channel\n", "a.csv"))
     (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(FileContentError, match="is not a text file"):

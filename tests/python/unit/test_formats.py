@@ -68,7 +68,7 @@ def test_a_format_that_is_added_is_found_everywhere(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "| Pairs (.pairs): real FRFs of one point | `write` | `jointfrf[pairs]` |" in done.stdout
     said, help_ = " ".join(done.stdout.split()).split("usage:")
-    assert "is of an unknown format; known are Universal File (.uff .unv)" in said
+    assert "is of an unknown format; use one of Universal File (.uff .unv)" in said
     assert said.count("and Pairs (.pairs)") == 1
     assert "and Pairs (.pairs)" in help_
     assert "or Pairs (.pairs)" in help_
@@ -94,7 +94,9 @@ def test_the_help_lists_the_formats_that_are_written(command):
 def test_a_name_without_a_known_suffix_is_not_written(tmp_path):
     frfs = jointfrf.io.read_frfs(ROOT / "cases" / "hammer-test" / "two_bars.uff")
     for name in ("a", "a.mat", "a.xlsx"):
-        with pytest.raises(ValueError, match=r"has no suffix of a format that is written: \.uff, \.unv, \.npz"):
+        with pytest.raises(
+            ValueError, match=r"has no suffix of a format that is written; use one of \.uff, \.unv, \.npz"
+        ):
             jointfrf.io.write_frfs(tmp_path / name, frfs)
     jointfrf.io.write_frfs(tmp_path / "A.CSV", frfs)
     assert jointfrf.io.read_frfs(tmp_path / "A.CSV").responses == frfs.responses

@@ -106,7 +106,7 @@ def array_file():
 
 
 KNOWN = (
-    "is of an unknown format; known are Universal File (.uff .unv), MATLAB (.mat), NPZ (.npz), HDF5 (.h5 .hdf5) and "
+    "is of an unknown format; use one of Universal File (.uff .unv), MATLAB (.mat), NPZ (.npz), HDF5 (.h5 .hdf5) and "
     "CSV (.csv .txt)"
 )
 
@@ -117,9 +117,9 @@ KNOWN = (
         (b"%PDF-1.7\n\0\1\2", KNOWN),
         (b"some words\nand more\n", KNOWN),
         (bytes(range(1, 256)) + b"\0", KNOWN),
-        (pickled(), "is a pickle, which is not read because that can run any program"),
+        (pickled(), "is a pickle, which could run any program; save an NPZ file"),
         (array_file(), "is an NPY file, one array without frequencies"),
-        (b"\x1f\x8b\x08", "is compressed by gzip: unpack it"),
+        (b"\x1f\x8b\x08", "is compressed by gzip; unpack it"),
         (b"TDSm\0\0", "is a TDMS file of LabVIEW, which is not read; export its FRFs as a Universal File or CSV"),
         (b"LabVIEW Measurement\t\r\n", "is an LVM file of LabVIEW, which is not read; export its FRFs as"),
         (b"PK\x03\x04 and nothing", "cannot be read as an NPZ file"),
@@ -171,7 +171,7 @@ def test_stated_sizes_that_exceed_the_file(tmp_path):
     path = tmp_path / "huge.npz"
     for shape in ((10**12, 1, 1), (10**6, 10**6, 10**9)):
         npz_with_header(path, shape)
-        assert "is damaged: h.npy does not hold the" in refused(path)
+        assert "is damaged: h.npy has not the" in refused(path)
     path = tmp_path / "huge.h5"
     write_hdf5(path, GIVEN)
     with h5py.File(path, "r+") as file:
@@ -231,7 +231,7 @@ def test_damaged_texts_of_an_hdf5_file(tmp_path):
 def test_python_objects_are_not_read(tmp_path):
     path = tmp_path / "objects.npz"
     np.savez(path, freq=FREQ_HZ, h=np.array([{"a": 1}], dtype=object))
-    assert "holds Python objects (h.npy), which are not read because that can run any program" in refused(path)
+    assert "holds Python objects (h.npy), which could run any program; save plain arrays" in refused(path)
 
 
 def test_numbers_of_the_other_byte_order(tmp_path):
@@ -375,11 +375,14 @@ def test_files_beyond_a_limit_are_not_read(tmp_path, monkeypatch):
     path = tmp_path / "own.npz"
     write_npz(path, GIVEN)
     monkeypatch.setenv("JOINTFRF_FILE_LIMIT_GB", "1e-6")
-    assert "more than the 1e-06 GB that are read: limit_gb=, --limit-gb or the environment variable" in refused(path)
+    assert (
+        "more than the 1e-06 GB that are read; raise this limit by limit_gb=, --limit-gb or the environment variable"
+        in refused(path)
+    )
     monkeypatch.setenv("JOINTFRF_FILE_LIMIT_GB", "2")
     np.testing.assert_array_equal(read_frfs(path).h, GIVEN.h)
     monkeypatch.setenv("JOINTFRF_FILE_LIMIT_GB", "much")
-    with pytest.raises(FileContentError, match="JOINTFRF_FILE_LIMIT_GB is 'much': it must be a number of GB"):
+    with pytest.raises(FileContentError, match="JOINTFRF_FILE_LIMIT_GB is 'much'; set it to a number of GB"):
         read_frfs(path)
 
 

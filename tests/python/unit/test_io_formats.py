@@ -169,9 +169,9 @@ def test_an_unclear_order_of_axes_must_be_said():
     channels = ["1:x", "2:x", "3:x"]
     h = np.arange(27.0).reshape(3, 3, 3)
     arguments = {"responses": channels, "excitations": channels, "quantity": "receptance", "unit": "m/N"}
-    with pytest.raises(FileContentError, match="is frequency is not clear from the sizes: give axes="):
+    with pytest.raises(FileContentError, match="is frequency is not clear from the sizes; give axes="):
         frfs_of_arrays([1, 2, 3], h, axes="", **arguments)
-    with pytest.raises(ValueError, match="axes 'freq,out' are not freq, out and in, in their order"):
+    with pytest.raises(ValueError, match="axes 'freq,out' do not name freq, out and in; give them in their order"):
         frfs_of_arrays([1, 2, 3], h, axes="freq,out", **arguments)
     np.testing.assert_array_equal(frfs_of_arrays([1, 2, 3], h, axes="out,in,freq", **arguments).h[0], h[:, :, 0])
 

@@ -203,7 +203,9 @@ def test_what_unfolds_to_more_than_the_limit_is_not_read(tmp_path, name, make, l
     beyond = rf"states content of .* GB or more, beyond the {limit or 1:g} GB that a"
     with pytest.raises(FileContentError, match=beyond) as error:
         read_frfs(path, limit_gb=limit)
-    assert "limit_gb=, --limit-gb or the environment variable JOINTFRF_FILE_LIMIT_GB raises" in str(error.value)
+    assert "; raise this limit by limit_gb=, --limit-gb or the environment variable JOINTFRF_FILE_LIMIT_GB" in str(
+        error.value
+    )
 
 
 @pytest.mark.filterwarnings("ignore::jointfrf.FileContentWarning")
