@@ -151,11 +151,13 @@ def test_the_own_layout_is_in_si_units(tmp_path, write):
 
 def test_an_option_must_have_an_effect_on_one_of_several_files(tmp_path):
     (tmp_path / "a.uff").write_bytes(function())
-    write_mat(tmp_path / "b.mat", f=[10.0, 12.0, 14.0], A=2 * VALUES, unit="m/s^2/N")
-    mapping = {"h": "A", "responses": ["2:y"], "excitations": ["1:y"]}
+    write_mat(
+        tmp_path / "b.mat", f=[10.0, 12.0, 14.0], A=2 * VALUES, responses="2:y", excitations="1:y", unit="m/s^2/N"
+    )
+    mapping = {"h": "A", "axes": "freq,out,in"}
     found = read_frfs(tmp_path / "a.uff", tmp_path / "b.mat", mapping=mapping)
     np.testing.assert_array_equal(found.h[:, :, 0].T, [VALUES, 2 * VALUES])
-    with pytest.raises(ValueError, match=r"mapping h= and mapping responses= .*have no effect on .*a\.uff"):
+    with pytest.raises(ValueError, match=r"mapping h= and mapping axes= have no effect on .*a\.uff"):
         read_frfs(tmp_path / "a.uff", mapping=mapping)
 
 
@@ -176,7 +178,7 @@ def test_a_preamble_is_skipped_when_the_user_says_so(tmp_path):
 
 def test_time_data_are_named(tmp_path):
     np.savez(tmp_path / "a.npz", t=FREQ_HZ, x=FREQ_HZ)
-    with pytest.raises(FileContentError, match=r"has times \(t\) and no FRFs .*estimate FRFs .*pyFRF"):
+    with pytest.raises(FileContentError, match=r"has times \(t\) and no FRFs.*estimate FRFs .*pyFRF"):
         read_frfs(tmp_path / "a.npz")
 
 
