@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import reprlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, cast, get_args
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.kernel.arguments import FloatArray, as_names, as_real, check_type
-from jointfrf.spelling import did_you_mean
+from jointfrf.spelling import did_you_mean, some_of
 
 __all__ = [
     "DIRECTIONS",
@@ -29,6 +29,7 @@ __all__ = [
     "point_and_direction",
     "rigid_motion",
     "rigid_offset",
+    "similar_dof",
 ]
 
 #: The six directions of a point: displacements, then rotations, right-handed.
@@ -229,6 +230,28 @@ def joint_parameters(
     if cross:
         pairs += [(a, b) for i, a in enumerate(dofs) for b in dofs[i + 1 :]]
     return tuple(Parameter(kind, *pair) for kind in kinds for pair in pairs)
+
+
+def similar_dof(name: str, known: Iterable[str]) -> str:
+    """Return the end of a sentence that proposes a known DOF; empty if none is similar.
+
+    Parts name rotations differently: a rotation at the same node comes before a name that only looks alike.
+
+    Examples
+    --------
+    >>> from jointfrf.dofs import similar_dof
+    >>> similar_dof("A/3:theta", ["A/3:y", "A/3:theta_z"]), similar_dof("3:theta_z", ["3:y", "3:theta"])
+    ('; did you mean A/3:theta_z?', '; did you mean 3:theta?')
+    """
+    names = list(known)
+    node, mark, direction = name.rpartition(":")
+    if is_rotation(direction):
+        here = {one: one[len(node + mark) :] for one in names if one.startswith(node + mark)}
+        turns = [one for one, own in here.items() if is_rotation(own)]
+        same = [one for one in turns if _PLACES.get(here[one].lower(), -1) == _PLACES.get(direction.lower())]
+        if turns:
+            return f"; did you mean {some_of(same or turns, 3, ' or ')}?"
+    return did_you_mean(name, names)
 
 
 def compliance_unit(response: str, force: str) -> str:

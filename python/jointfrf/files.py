@@ -21,6 +21,7 @@ __all__ = [
     "ReadLimit",
     "below",
     "check_file",
+    "check_stated",
     "damage_named",
     "head_of",
     "text_of",
@@ -106,6 +107,32 @@ class ReadLimit:
                 f"{self._path} states content of {self._taken / 1e9:.3g} GB or more, beyond the "
                 f"{self.bytes / 1e9:.3g} GB that a file may take; {_RAISED}"
             )
+
+
+def check_stated(what: str, size: float) -> None:
+    """Check the memory that a number in a small file asks for, before the number is used.
+
+    Parameters
+    ----------
+    what : str
+        File and number, for the message: ``case.toml: elements = 1000000``.
+    size : float
+        Bytes.
+
+    Raises
+    ------
+    FileContentError
+        It is more than the limit of `ReadLimit` for a small file.
+
+    Examples
+    --------
+    >>> check_stated("part.toml: elements = 6", 6 * 2000)
+    """
+    limit = 1e9 * (_limit_gb(None) or _SMALL)
+    if not size <= limit:
+        raise FileContentError(
+            f"{what} needs {size / 1e9:.3g} GB, beyond the {limit / 1e9:.3g} GB that a file may take; {_RAISED}"
+        )
 
 
 def check_file(path: Path, limit_gb: float | None = None) -> None:

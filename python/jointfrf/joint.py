@@ -210,7 +210,7 @@ class Joint:
         Returns
         -------
         str
-            Lines of input, 12 to 14 digits.
+            Lines of input; numbers have 14 digits, or as many as their field takes (9 at least).
 
         Raises
         ------

@@ -12,8 +12,8 @@ import numpy as np
 
 from jointfrf.cases.keys import MAP, UNIT, read_frf_file
 from jointfrf.cases.structure import Structure, SubstructureKeys
-from jointfrf.dofs import direction_names
-from jointfrf.io.fe.nodes import read_dof_names, read_nodes
+from jointfrf.dofs import direction_names, similar_dof
+from jointfrf.io.fe.nodes import NodeFile, read_dof_names, read_nodes
 from jointfrf.io.modes import ModesFile, read_modes
 from jointfrf.io.units import UnitSystemName, model_units
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -54,7 +54,7 @@ class ModalStructure(Structure):
         number = {dof: i for i, dof in enumerate(self.modes.dofs)}
         missing = [dof for dof in dofs if dof not in number]
         if missing:
-            raise ValueError(f"there is no DOF {missing[0]!r}")
+            raise ValueError(f"there is no DOF {missing[0]!r}{similar_dof(missing[0], number)}")
         return [number[dof] for dof in dofs]
 
     def receptance(self, freq_hz: FloatArray, points: Sequence[str]) -> ComplexArray:
@@ -112,8 +112,13 @@ class ModesKeys(SubstructureKeys, tag="modes"):
         dofs = self._names(found)
         if found.is_rigid.any() and found.modal_mass is None:
             raise self.wrong("file", "complex modes at 0 Hz have no scale: leave them to the residuals")
+        file = self._node_file(found)
+        if self.nodes is not None and not found.has_nodes:  # those of the modes' own file are turned
+            dofs = file.named(dofs)
+        length = 1.0 if file.is_si or self.units is None else model_units(self.units).length
+        places = {node: length * at for node, at in file.coordinates.items()}
         modes = _modal_frfs(found, dofs, self.damping_ratio)
-        whole = ModalStructure(modes, (), self._places(found))
+        whole = ModalStructure(modes, (), places)
         about = [_about(path.name, found, modes), *(f"warning: {note}" for note in found.notes)]
         if self.residuals is not None:
             modes, said = self._with_residuals(whole)
@@ -136,15 +141,15 @@ class ModesKeys(SubstructureKeys, tag="modes"):
             raise self.wrong("dofs", "a DOF is named twice")
         return names
 
-    def _places(self, found: ModesFile) -> dict[str, FloatArray]:
+    def _node_file(self, found: ModesFile) -> NodeFile:
+        """Return the nodes: those of their own file, whose turned directions are not of the modes, or of the modes."""
         if self.nodes is None and not found.has_nodes:
-            return {}
+            return NodeFile()
         name = "file" if self.nodes is None else "nodes"
         file = self.build(partial(read_nodes, self.file_of(name)), name)
         if self.units is None and not file.is_si and file.coordinates:
             raise self.missing(["units"], f"{self.file_of(name).name} states no unit")
-        length = 1.0 if file.is_si or self.units is None else model_units(self.units).length
-        return {node: length * at for node, at in file.coordinates.items()}
+        return file
 
     def _with_residuals(self, whole: ModalStructure) -> tuple[ModalFrfs, list[str]]:
         """Return the modes with residuals of measured FRFs, and what these cover."""

@@ -28,7 +28,7 @@ from jointfrf.assembly_file.keys import (
 )
 from jointfrf.assembly_file.modes import ModalStructure, ModesKeys
 from jointfrf.cases.substructures import SUBSTRUCTURES, MeasuredStructure, ModelStructure, Structure
-from jointfrf.dofs import is_rotation
+from jointfrf.dofs import is_rotation, similar_dof
 from jointfrf.frf.frf_set import Channel
 from jointfrf.identification.joint_file import read_joint
 from jointfrf.identification.model.assembly import (
@@ -131,6 +131,13 @@ class AssemblyPart:
             return self.structure.frfs.has(channel, channel)
         except ValueError:
             return False
+
+    def similar(self, dof: str) -> str:
+        """Return the end of a sentence that proposes a DOF of the part."""
+        own = self.structure
+        if isinstance(own, ModelStructure):
+            return similar_dof(dof, own.model.dofs)
+        return similar_dof(dof, own.modes.dofs) if isinstance(own, ModalStructure) else ""
 
     @property
     def places(self) -> dict[str, FloatArray]:
@@ -492,7 +499,7 @@ class AssemblyFile:
             own = part.keys
             for dof in own.joint:
                 if not part.has(dof):
-                    raise own.wrong("joint", f"{name} has no DOF {dof!r}")
+                    raise own.wrong("joint", f"{name} has no DOF {dof!r}{part.similar(dof)}")
             if joint is not None and len(own.joint) == len(joint.dofs):  # else it is said how many there must be
                 own.build(lambda own=own: check_joint_order("", own.joint, joint.dofs), "joint")  # type: ignore[misc]
             begin = f"{name}/"

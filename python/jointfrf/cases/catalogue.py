@@ -14,7 +14,7 @@ from jointfrf.cases.comparison import verdict_sentence
 from jointfrf.cases.keys import Case, CaseKeys, ExpectedKeys
 from jointfrf.cases.kind import CaseKind
 from jointfrf.cases.workers import Workers
-from jointfrf.files import below, check_file, write_file
+from jointfrf.files import below, check_file, check_stated, write_file
 from jointfrf.report.document import Document, Page, make_document
 from jointfrf.report.draw import Drawing, draw
 from jointfrf.report.figure import Figure, figure_csv
@@ -60,6 +60,8 @@ class _Kinds(Mapping[str, CaseKind[Any, Any]]):
         return kind
 
 
+#: Bytes of memory of a realisation of the noise, chunks and estimates included.
+_REALISATION = 1_000
 #: The kinds of cases, by the value of `kind` in `case.toml`; the first is that of a case that names none.
 KINDS: Mapping[str, CaseKind[Any, Any]] = _Kinds(
     "known-joint",
@@ -290,6 +292,9 @@ def run_case(
         raise ValueError(f"realisations must be at least 1, not {realisations}")
     at_work = workers or Workers()
     case, kind = read_case_and_kind(Path(folder), kinds)
+    if realisations is None:
+        stated = f"{case.folder / 'case.toml'}: realisations = {case.realisations}"
+        check_stated(stated, _REALISATION * case.realisations)
     target = Path(out) / case.name
     for inner in ("tables", "figures"):
         below(target, inner).mkdir(parents=True, exist_ok=True)

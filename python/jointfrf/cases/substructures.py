@@ -25,11 +25,13 @@ from jointfrf.models.beam import BeamElement, End, beam
 from jointfrf.models.matrices import is_symmetric
 from jointfrf.models.model import Ground, chain
 from jointfrf.models.points import Coupling, PointModel, PointPatch, couple_points
-from jointfrf.solids.brick_beam import Face, Hole, Preset, brick_beam
+from jointfrf.solids.brick_beam import Face, Hole, Preset, beam_divisions, brick_beam
 from jointfrf.toml.declared import Keys, NotNegative, Positive, key
 from jointfrf.toml.table import TomlTable
 
 __all__ = [
+    "BEAM_ELEMENT",
+    "BRICK",
     "PRESET",
     "SUBSTRUCTURES",
     "MatricesKeys",
@@ -133,7 +135,7 @@ class MatricesKeys(SubstructureKeys, tag="matrices"):
         found, dofs, held = _without_empty(found, dofs)
         found = _in_si(found, dofs, units)
         model = PointModel(
-            found["stiffness"], found["mass"], _marked(dofs, file.turned), found.get("damping"),
+            found["stiffness"], found["mass"], file.named(dofs), found.get("damping"),
             found.get("structural_damping"), self.loss_factor, places=_places(dofs, file, units),
         )  # fmt: skip
         patches = [
@@ -229,15 +231,6 @@ def _in_si(
     return {name: sparse.csr_array(units.scale(power[name]) * (by_dof @ one @ by_dof)) for name, one in found.items()}
 
 
-def _marked(dofs: tuple[str, ...], turned: Sequence[str]) -> tuple[str, ...]:
-    """Return names of DOFs; those of nodes with directions of their own say so."""
-    own = set(turned)
-    if not own:
-        return dofs
-    parts = (dof.rpartition(":") for dof in dofs)
-    return tuple(f"{node}:local_{way}" if node in own else f"{node}:{way}" for node, _, way in parts)
-
-
 def _places(dofs: Sequence[str], file: NodeFile, units: ModelUnits) -> dict[str, FloatArray]:
     """Return where the nodes of the DOFs are, m."""
     length = 1.0 if file.is_si else units.length
@@ -254,7 +247,7 @@ def _about(
     text = f"{names} ({program + ', ' if program else ''}{units.name})"
     halves = sorted({one.completed for one in stored.values() if one.completed})
     if halves:
-        text += f"; the {' and the '.join(halves)} triangle is stored, the other one was filled in"
+        text += f"; {' and '.join(halves)} is stored, the rest was completed by symmetry"
     text += f"; {held} DOFs without any entry are held and left out" if held else ""
     return text + (f"; {turned} nodes have directions of their own, named local_x" if turned else "")
 
@@ -265,13 +258,15 @@ def _unsymmetric(path: Path, matrix: sparse.csr_array) -> str:
     worst = int(np.argmax(abs(difference.data)))
     i, j = int(difference.row[worst]), int(difference.col[worst])
     text = (
-        f"{path} must hold a symmetric matrix: entry ({i + 1}, {j + 1}) is {matrix[i, j]:g}, "
+        f"{path} must contain a symmetric matrix: entry ({i + 1}, {j + 1}) is {matrix[i, j]:g}, "
         f"({j + 1}, {i + 1}) is {matrix[j, i]:g}"
     )
     is_triangle = sparse.triu(matrix, 1).count_nonzero() == 0 or sparse.tril(matrix, -1).count_nonzero() == 0
-    return text + ("; it holds one triangle only" if is_triangle else "")
+    return text + ("; it contains one triangle only" if is_triangle else "")
 
 
+#: Bytes of memory of a beam element and of a brick, names of DOFs and assembly included.
+BEAM_ELEMENT, BRICK = 2_000, 25_000
 #: A key of all models of bricks.
 PRESET = key("Elements: `seed` as in the thesis (C3D8R), `accurate` with incompatible modes (C3D8I).", example="seed")
 
@@ -316,6 +311,7 @@ class BeamKeys(SubstructureKeys, tag="beam"):
         is_flexible = self.element == "shear-flexible"
         if is_flexible and self.poisson is None:
             raise self.missing(["poisson"], "shear-flexible elements have one")
+        self.table.check_stated("elements", BEAM_ELEMENT * self.elements)
         model = self.build(lambda: beam(
             self.length, self.elements, youngs_modulus=self.youngs_modulus, density=self.density, width=self.width,
             height=self.height, ends=self.ends, element=self.element, axial=self.axial,
@@ -359,6 +355,9 @@ class BrickBeamKeys(SubstructureKeys, MaterialKeys, tag="brick-beam"):
 
     def structure(self, freq_hz: FloatArray) -> Structure:
         """Return the structure."""
+        default = self.build(lambda: beam_divisions(self.length, self.height, holed=self.hole is not None))
+        nx, ny, nz = self.divisions or default
+        self.table.check_stated("divisions" if self.divisions else "length", BRICK * nx * ny * nz)
         one = self.hole
         hole = None if one is None else Hole(one.position, one.radius, one.patch_radius, one.face)
         material = self.material

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -9,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
+from jointfrf.channels.extent import extent_of, longest_extent
 from jointfrf.dofs import DIRECTIONS, direction_names, direction_places, rigid_motion
+from jointfrf.errors import FrfCheckWarning
 from jointfrf.frf.frf_set import Channel, check_apart
 from jointfrf.kernel.arguments import (
     ComplexArray,
@@ -279,6 +282,7 @@ def interface(
     coordinates: Mapping[int, NDArray[np.float64]],
     *,
     bending_stiffness: float | None = None,
+    highest_hz: float | None = None,
 ) -> Interface:
     """Build the joint DOFs of both sides from points along lines.
 
@@ -294,6 +298,8 @@ def interface(
     bending_stiffness : float, optional
         E I of the sides, N m^2, from which `difference_error` estimates what rotations miss; `identify` widens their
         intervals by it.
+    highest_hz : float, optional
+        Upper end of the band, Hz, for the warning.
 
     Returns
     -------
@@ -304,6 +310,11 @@ def interface(
     ValueError
         A stiffness that is not positive, an unknown DOF, a node without coordinates, points that are not on a line
         along an axis, a rotation about the line of its points.
+
+    Warns
+    -----
+    FrfCheckWarning
+        The points of a side are more than 3 m apart, or more than 20 wave lengths.
 
     Notes
     -----
@@ -330,6 +341,7 @@ def interface(
     check_apart(points_j, points_k)
     sides = [_one_side(points, places, coordinates) for points in (points_j, points_k)]
     (channels_j, rows_j, at_j), (channels_k, rows_k, at_k) = sides
+    _warn_of_extent({"j": points_j, "k": points_k}, coordinates, highest_hz)
     motion = block_diag(_motion(channels_j, coordinates, at_j), _motion(channels_k, coordinates, at_k))
     compliance = None
     if bending_stiffness is not None:
@@ -339,6 +351,21 @@ def interface(
         compliance = np.where(np.array(places) < len(_AXES), 0.0, own)
     transform = block_diag(rows_j, rows_k)
     return Interface((*channels_j, *channels_k), transform, (at_j, at_k), direction_names(dofs), motion, compliance)
+
+
+def _warn_of_extent(
+    sides: Mapping[str, Sequence[int]], coordinates: Mapping[int, NDArray[np.float64]], highest_hz: float | None
+) -> None:
+    """Warn of a side whose points are too far apart for a joint."""
+    extents = {side: extent_of([coordinates[node] for node in points]) for side, points in sides.items()}
+    side = max(extents, key=extents.__getitem__)
+    if extents[side] > longest_extent(highest_hz):
+        warnings.warn(
+            f"the points of side {side} are {extents[side]:.3g} m apart, as if coordinates were in millimetres; give "
+            "them in metres",
+            FrfCheckWarning,
+            stacklevel=3,
+        )
 
 
 def _motion(

@@ -41,11 +41,11 @@ _OPTIONS = (
     ("full_matrix", "--full-matrix"),
     ("(bounds)", "(--bounds)"),
     ("name the freq_hz at which it is taken", "name by --frequency HZ that at which it is taken"),
-    ("freq_hz names one frequency instead", "--frequency HZ names one frequency instead"),
+    ("name one frequency by freq_hz", "name one frequency by --frequency HZ"),
     ("leave connector out", "leave --connector out"),
     ("and connector exclude", "and --connector exclude"),
-    ("table_hz= gives", "--frequency LOW:HIGH gives"),
-    ("damping=False leaves", "--no-damping leaves"),
+    ("by table_hz=", "by --frequency LOW:HIGH"),
+    ("with damping=False", "with --no-damping"),
     ("name one in points", "name one by --joint-at"),
 )
 #: Lines of a table between which K* differs from a straight line by less than this share; it doubles so often at most.
@@ -151,8 +151,8 @@ def _at_point(found: JointFile, point: str | None) -> JointFile:
         return found
     if found.fit is None or point not in known:
         raise UsageError(
-            f"--point must name one joint point of the file, {', '.join(known) or 'which has none'}"
-            + (f", not {point!r}" if point is not None else ", or PROGRAM:NAME=J,K:... the nodes of all")
+            f"--point must be one joint point of the file ({', '.join(known) or 'it has none'})"
+            + (f", not {point!r}" if point is not None else "; or name the nodes of all, PROGRAM:NAME=J,K:...")
         )
     fit = found.fit.at_point(point)
     return found._replace(fit=fit, joint=fit.joint, about=(*found.about, f"joint point {point}"))
@@ -250,8 +250,8 @@ def _ends(text: str, program: str, rest: str) -> list[int]:
         raise argparse.ArgumentTypeError(f"{text!r} names a node twice")
     if len(ends) not in (2, 4 if program == "calculix" else 2):
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not a program and nodes j and k like abaqus:9001,9002, of several joints "
-            "abaqus:fl=9001,9002:fr=9003,9004; calculix takes two ROT NODEs more"
+            f"{text!r} must be a program with nodes j and k, such as abaqus:9001,9002 or, of several joints, "
+            "abaqus:fl=9001,9002:fr=9003,9004; calculix needs two ROT NODEs more"
         )
     return ends
 
@@ -326,7 +326,7 @@ def card_request(
             ("--faces", args.faces),
         ):
             if given is not None:
-                raise UsageError(f"{name} is for cards: say --export PROGRAM:J,K, too")
+                raise UsageError(f"{name} is for cards; add --export PROGRAM:J,K")
         flags = ("--element", "--property", "--full-matrix", "--connector", "--all-damping", "--bounds", "--no-damping")
         warn_of_ignored(args, flags, "it is for cards, --export PROGRAM:J,K")
         return None
@@ -370,7 +370,7 @@ def _check_joints(args: argparse.Namespace, dofs: Sequence[str], of_joints: Mapp
         )
     for name, given in (("--nodes-at", args.nodes_at), ("--faces", args.faces)):
         if of_joints and given is not None:
-            raise UsageError(f"{name} is of one joint: --save, then jointfrf export FILE PROGRAM:J,K --point NAME")
+            raise UsageError(f"{name} is of one joint; use --save, then jointfrf export FILE PROGRAM:J,K --point NAME")
 
 
 def _probe(n: int, dofs: Sequence[str], damping: str, cross: str) -> Joint:
@@ -382,12 +382,12 @@ def _probe(n: int, dofs: Sequence[str], damping: str, cross: str) -> Joint:
 
 
 def _refusal(why: str, damping: str) -> str:
-    """Say with the words of the command line what a program cannot hold."""
+    """Return an error of an export in the words of the command line."""
     if "MATRIX27" in why and damping:
         may = f"--damping {damping} may find" if damping == "auto" else f"--damping {damping} fits"
-        return f"MATRIX27 of ansys holds no hysteretic damping, which {may}: say --damping viscous, or --no-damping"
-    if "rotation_nodes must" in why:
-        return "rotations of calculix need the ROT NODEs of both rigid bodies after their nodes: calculix:J,K,ROTJ,ROTK"
+        return f"MATRIX27 of ansys has no hysteretic damping, which {may}; use --damping viscous, or --no-damping"
+    if "in rotation_nodes" in why:
+        return "calculix has rotations at ROT NODEs of rigid bodies only; name both, calculix:J,K,ROTJ,ROTK"
     for argument, option in _OPTIONS:
         why = why.replace(argument, option)
     return why

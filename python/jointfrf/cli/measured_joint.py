@@ -394,7 +394,7 @@ def _point_lines(
             )
     at = {node: places.get(node, np.zeros(3)) for node in (*nodes[0], *nodes[1])}
     try:
-        return interface(*nodes, args.dofs, at, bending_stiffness=bending_stiffness)
+        return interface(*nodes, args.dofs, at, bending_stiffness=bending_stiffness, highest_hz=frfs.freq_hz[-1])
     except ValueError as error:
         if args.spacing is not None or any(node not in frfs.coordinates for node in at):
             raise

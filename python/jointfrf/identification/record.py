@@ -14,7 +14,7 @@ import numpy as np
 
 from jointfrf.dofs import Parameter
 from jointfrf.errors import FileContentError
-from jointfrf.files import check_file, write_file
+from jointfrf.files import check_file, check_stated, write_file
 from jointfrf.identification.derived import Derived
 from jointfrf.identification.findings import Finding, FitFindingKind
 from jointfrf.identification.result import Fit, FittedParameter, SeenStiffness
@@ -30,6 +30,8 @@ __all__ = ["fit_from_dict", "fit_to_dict", "load", "read_record", "save"]
 _FORMAT, _VERSION = "jointfrf joint", 2
 #: Probabilities of the intervals that are kept: the quartiles, one standard deviation, and what is usually quoted.
 _PROBABILITIES = (0.5, 0.6827, 0.9, 0.95, 0.99)
+#: Bytes of memory of a frequency line.
+_LINE = 32
 _INFINITE = {"inf": np.inf, "-inf": -np.inf}
 
 
@@ -310,6 +312,8 @@ def _fit_of(content: object, source: str) -> Fit:
             raise FileContentError(f'{source}: "{key}" is missing')
         try:
             read[key] = reader(content.get(key), read)
+        except FileContentError as error:
+            raise FileContentError(f"{source}: {error}") from None
         except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError):
             raise FileContentError(f'{source}: "{key}" is damaged') from None
     parameters, values = read["parameters"]
@@ -414,7 +418,9 @@ def _covariance_of(content: Any, read: dict[str, Any]) -> FloatArray:
 
 def _lines_of(content: Any, _: dict[str, Any]) -> FloatArray:
     if isinstance(content, dict):
-        freq = np.linspace(_number(content["first"]), _number(content["last"]), int(content["number"]))
+        number = int(content["number"])
+        check_stated(f'"lines_hz" of {number} lines', _LINE * number)
+        freq = np.linspace(_number(content["first"]), _number(content["last"]), number)
     else:
         freq = np.array([_number(value) for value in content], np.float64)
     if freq.size == 0 or not np.isfinite(freq).all():

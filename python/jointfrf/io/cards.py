@@ -15,12 +15,14 @@ from jointfrf.io.units import ModelUnits, UnitSystemName, model_units
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_nodes, as_real, check_choice
 from jointfrf.spelling import visible
 
-__all__ = ["CardFormat", "CardOptions", "rigid_cards", "spring_cards", "table_cards"]
+__all__ = ["CardFormat", "CardOptions", "card_integer", "card_real", "rigid_cards", "spring_cards", "table_cards"]
 
 CardFormat = Literal["abaqus", "calculix", "nastran", "ansys"]
 
 #: Largest number of a node, an element or a property: eight columns.
 _LARGEST = 99_999_999
+#: Columns of a large field of Nastran; digits after the point that every number keeps.
+_WIDE, _DIGITS = 16, 8
 #: How far from symmetric, relative to the largest entry, rounding may leave a matrix.
 _ROUND_OFF = 1e-10
 #: Arms shorter than this are rounding, m.
@@ -118,7 +120,7 @@ class _Link(NamedTuple):
         # What cancels but for rounding is nothing; diagonals of damping may be negative.
         size = np.sqrt(abs(moved.diagonal()))
         moved[abs(moved) < _ROUND_OFF * np.outer(size, size)] = 0
-        return (moved + moved.T) / 2
+        return np.asarray(moved + (moved.T - moved) / 2)
 
     def calculix_dof(self, place: int) -> tuple[int, int]:
         """Return node and DOF of one of twelve; rotations are displacements of the ROT NODEs."""
@@ -126,9 +128,7 @@ class _Link(NamedTuple):
         if direction < 3:
             return self.nodes[side], direction + 1
         if len(self.nodes) < 4:
-            raise ValueError(
-                "rotation_nodes must name the ROT NODEs of the two rigid bodies: calculix has rotations nowhere else"
-            )
+            raise ValueError("calculix has rotations at ROT NODEs of rigid bodies only; name the two in rotation_nodes")
         return self.nodes[2 + side], direction - 2
 
     def comments(self, mark: str) -> list[str]:
@@ -196,11 +196,11 @@ def table_cards(
     """
     check_choice("program", program, get_args(CardFormat))
     if program not in ("abaqus", "nastran"):
-        raise ValueError(f"{program} has no tables over frequency: freq_hz names one frequency instead")
+        raise ValueError(f"{program} has no tables over frequency; name one frequency by freq_hz")
     if options.get("full_matrix", False):
-        raise ValueError("full_matrix is not for tables over frequency: matrices have none")
+        raise ValueError("full_matrix has no tables over frequency; leave one of them out")
     if freq_hz.size < 2 or not (freq_hz[0] > 0 and (np.diff(freq_hz) > 0).all()):
-        raise ValueError("table_hz must hold at least two frequencies above 0 Hz that increase")
+        raise ValueError("table_hz must contain at least two frequencies above 0 Hz that increase")
     lines = np.stack([k_joint.real, k_joint.imag / (2 * np.pi * freq_hz[:, None, None])])
     if not options.get("damping", True):
         lines[1] = 0
@@ -218,13 +218,14 @@ def table_cards(
     return _text(program, link._replace(table=table, notes=(*link.notes, *about)), options)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # `card_real` rejects the numbers that come of it
 def _text(program: CardFormat, link: _Link, options: CardOptions) -> str:
     """Write the elements of a joint, and what follows its nodes."""
     is_connector = options.get("connector", False)
     if is_connector and program != "abaqus":
-        raise ValueError(f"connector elements are for abaqus, not for {program}: leave connector out")
+        raise ValueError(f"connector elements are for abaqus, not for {program}; leave connector out")
     if is_connector and options.get("full_matrix", False):
-        raise ValueError("full_matrix and connector exclude each other: name one of them")
+        raise ValueError("full_matrix and connector exclude each other; name one of them")
     is_matrix = options.get("full_matrix", False) or _coupled(link)
     if program == "calculix":
         lines = _calculix(link)
@@ -261,10 +262,13 @@ def _link(
     turning_nodes = options.get("rotation_nodes")
     turning = () if turning_nodes is None else _two_nodes("rotation_nodes", turning_nodes)
     if program == "calculix" and options.get("full_matrix", False):
-        raise ValueError("full_matrix is not for calculix, which reads no matrices: leave it out")
+        raise ValueError("full_matrix is not for calculix, which reads no matrices; leave it out")
     if turning and program != "calculix":
-        raise ValueError(f"rotation_nodes are for calculix: the nodes of {program} have rotations of their own")
-    element, number = _number("element", options.get("element", 1)), _number("number", options.get("number", 1))
+        raise ValueError(f"rotation_nodes are for calculix, not for {program}; leave them out")
+    element, number = (
+        card_integer("element", options.get("element", 1)),
+        card_integer("number", options.get("number", 1)),
+    )
     positions, arms, where = _geometry(options, units)
     faces = _faces(options.get("faces"), numbers)
     notes = (note, *_text_lines(options.get("comments", ())), *_text_lines(where), *_arm_note(arms, units))
@@ -278,8 +282,12 @@ def _widened(name: str, matrix: FloatArray, seconds: int, places: NDArray[np.int
     turns = places > 2
     rotations = turns.astype(int)[:, None] + turns
     scale = np.array([units.scale(seconds, count) for count in range(3)])
+    with np.errstate(over="ignore", under="ignore"):
+        scaled = (matrix + (matrix.T - matrix) / 2) / scale[rotations]
+    if not np.isfinite(scaled).all() or ((scaled == 0) & (matrix != 0)).any():
+        raise ValueError(f"the {name} of {abs(matrix).max():.3g} is out of range in units {units.words}; change it")
     whole = np.zeros((6, 6))
-    whole[np.ix_(places, places)] = (matrix + matrix.T) / 2 / scale[rotations]
+    whole[np.ix_(places, places)] = scaled
     return whole
 
 
@@ -300,8 +308,8 @@ def _geometry(options: CardOptions, units: ModelUnits) -> tuple[FloatArray | Non
     unit = units.words.partition(",")[0]
     if longest > _LONGEST_ARM:
         raise ValueError(
-            f"a node lies {longest / units.length:.4g} {unit} from the reference point of the joint: positions and "
-            f"points are in {unit}, the unit of length of {units.name}"
+            f"a node lies {longest / units.length:.4g} {unit} from the reference point of the joint; give positions "
+            f"and points in {unit}, as in {units.name}"
         )
     same = np.allclose(ends[0], ends[1], rtol=0, atol=_NO_ARM / units.length)
     texts = [f"({', '.join(f'{value:.6g}' for value in end + 0.0)}) {unit}" for end in ends]
@@ -318,10 +326,10 @@ def _faces(
         return None
     if isinstance(given, str) or len(given) != 2:
         raise ValueError("faces must be two lists of nodes, those that follow node j and those that follow node k")
-    first, second = (tuple(_number("faces", node) for node in as_nodes("faces", own)) for own in given)
+    first, second = (tuple(card_integer("faces", node) for node in as_nodes("faces", own)) for own in given)
     twice = (set(first) & set(second)) | ({*first, *second} & set(nodes))
     if twice:
-        raise ValueError(f"faces must hold each node once, and not the nodes of the joint, as {min(twice)}")
+        raise ValueError(f"faces must contain each node once, and not the nodes of the joint, as {min(twice)}")
     return first, second
 
 
@@ -440,7 +448,7 @@ def _body_cards(
         elif program == "abaqus":
             lines.append(f"*RIGID BODY, REF NODE={node}, PIN NSET={name}")
         elif program == "nastran":
-            fields = [str(element + 1 + "JK".index(side)), str(node), "123", *words]
+            fields = [str(card_integer("element", element + 1 + "JK".index(side))), str(node), "123", *words]
             lines += _small("RBE2", fields)
         else:
             lines += [f"CERIG,{node},{word},UXYZ" for word in words]
@@ -453,7 +461,8 @@ def _small(name: str, words: Sequence[str]) -> list[str]:
     return [f"{name if i == 0 else '+':<8}" + "".join(f"{word:>8}" for word in row) for i, row in enumerate(rows)]
 
 
-def _number(name: str, value: int) -> int:
+def card_integer(name: str, value: int) -> int:
+    """Check a number of a node, an element or a property: it has eight columns; raises ValueError."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 < value <= _LARGEST:
         raise ValueError(f"{name} must be an integer from 1 to {_LARGEST}, not {reprlib.repr(value)}")
     return int(value)
@@ -463,7 +472,7 @@ def _two_nodes(name: str, nodes: Sequence[int]) -> tuple[int, int]:
     two = as_nodes(name, nodes)
     if len(two) != 2 or two[0] == two[1]:
         raise ValueError(f"{name} must be two different nodes, not {reprlib.repr(nodes)}")
-    return _number(name, two[0]), _number(name, two[1])
+    return card_integer(name, two[0]), card_integer(name, two[1])
 
 
 def _coupled(link: _Link) -> bool:
@@ -478,9 +487,37 @@ def _upper_entries(link: _Link, matrix: FloatArray) -> list[tuple[int, int, int,
     return [(nodes[r // 6], r % 6 + 1, nodes[c // 6], c % 6 + 1, float(whole[r, c])) for r, c in found]
 
 
-def _real(value: float) -> str:
-    """14 digits: Abaqus and CalculiX read 20 columns."""
-    return f"{value:.13E}"
+def card_real(value: float, columns: int = 20, letter: str = "E") -> str:
+    """Return a number with as many digits as its field takes, 14 at most.
+
+    Parameters
+    ----------
+    value : float
+    columns : int
+        Of the field: Abaqus and CalculiX read 20, large fields of Nastran have 16.
+    letter : str
+        Of the exponent; without one the exponent has its sign and no zeros in front, as in Nastran.
+
+    Raises
+    ------
+    ValueError
+        The number is not finite, or so small that it has lost digits.
+
+    Examples
+    --------
+    >>> from jointfrf.io.cards import card_real
+    >>> card_real(6e5), card_real(-6e5, 16, ""), card_real(-1.25e-120, 16, "")
+    ('6.0000000000000E+05', '-6.00000000000+5', '-1.250000000-120')
+    """
+    if not np.isfinite(value) or 0 < abs(value) < np.finfo(np.float64).tiny:
+        raise ValueError(f"a card cannot contain {value:g}; check joint, units and positions for a number out of range")
+    text = ""
+    for digits in range(13, _DIGITS - 1, -1):
+        mantissa, exponent = f"{value:.{digits}E}".split("E")
+        text = f"{mantissa}{letter}{exponent}" if letter else f"{mantissa}{int(exponent):+d}"
+        if len(text) <= columns:
+            break
+    return text
 
 
 def _abaqus_springs(link: _Link) -> list[str]:
@@ -497,21 +534,21 @@ def _abaqus_springs(link: _Link) -> list[str]:
             ):
                 if values.any():
                     name = f"JOINT{link.number}_{letter}{i + 1}"
-                    lines += [f"*ELEMENT, TYPE={kind}, ELSET={name}", f"{element}, {joined}"]
+                    lines += [f"*ELEMENT, TYPE={kind}, ELSET={name}", f"{card_integer('element', element)}, {joined}"]
                     lines += [f"*{word}, ELSET={name}", of_dof]
-                    lines += [f"{_real(x)}, {_real(f)}" for x, f in zip(values, link.table.freq, strict=True)]
+                    lines += [f"{card_real(x)}, {card_real(f)}" for x, f in zip(values, link.table.freq, strict=True)]
                     element += 1
             continue
         if k != 0 or h != 0:
             name = f"JOINT{link.number}_K{i + 1}"
-            lines += [f"*ELEMENT, TYPE=SPRING2, ELSET={name}", f"{element}, {joined}"]
+            lines += [f"*ELEMENT, TYPE=SPRING2, ELSET={name}", f"{card_integer('element', element)}, {joined}"]
             lines += [f"*SPRING, ELSET={name}" + (", COMPLEX STIFFNESS" if h else ""), of_dof]
-            lines += [f"{_real(k)}, {_real(h)}" if h else _real(k)]
+            lines += [f"{card_real(k)}, {card_real(h)}" if h else card_real(k)]
             element += 1
         if c != 0:
             name = f"JOINT{link.number}_C{i + 1}"
-            lines += [f"*ELEMENT, TYPE=DASHPOT2, ELSET={name}", f"{element}, {joined}"]
-            lines += [f"*DASHPOT, ELSET={name}", of_dof, _real(c)]
+            lines += [f"*ELEMENT, TYPE=DASHPOT2, ELSET={name}", f"{card_integer('element', element)}, {joined}"]
+            lines += [f"*DASHPOT, ELSET={name}", of_dof, card_real(c)]
             element += 1
     return lines
 
@@ -522,11 +559,11 @@ def _abaqus_connector(link: _Link) -> list[str]:
     The relative motion of the joint's point is that of node K, moved by the arm of K as K turns against J.
     """
     if not link.has_one_point:
-        raise ValueError("a connector element needs one reference point of both sides of the joint: name one in points")
+        raise ValueError("a connector element needs one reference point of both sides of the joint; name one in points")
     if link.table is None and link.hysteretic.any():
         raise ValueError(
-            "a connector element holds no hysteretic damping: table_hz= gives a table over frequency that does, "
-            "damping=False leaves damping out"
+            "a connector element has no hysteretic damping; write a table over frequency by table_hz=, or leave "
+            "damping out with damping=False"
         )
     move = rigid_offset(DIRECTIONS, link.arms[1])
     name, j, k = f"JOINT{link.number}", *link.nodes[:2]
@@ -543,8 +580,8 @@ def _abaqus_connector(link: _Link) -> list[str]:
         lines.append(f"*CONNECTOR {word}" + (", FREQUENCY DEPENDENCE=ON" if link.table else ""))
         for freq, matrix in zip(table.freq, matrices, strict=True):
             moved = move.T @ matrix @ move
-            words = [_real(float(moved[row, column])) for column in range(6) for row in range(column + 1)]
-            words += [_real(float(freq))] if link.table else []
+            words = [card_real(float(moved[row, column])) for column in range(6) for row in range(column + 1)]
+            words += [card_real(float(freq))] if link.table else []
             lines += [", ".join(words[at : at + _IN_A_LINE]) for at in range(0, len(words), _IN_A_LINE)]
     return lines
 
@@ -562,7 +599,7 @@ def _abaqus_matrices(link: _Link) -> list[str]:
             name = f"JOINT{link.number}_{letter}"
             used.append(f"{word}={name}")
             lines += [f"*MATRIX INPUT, NAME={name}, TYPE=SYMMETRIC"]
-            lines += [f"{a}, {i}, {b}, {j}, {_real(x)}" for a, i, b, j, x in _upper_entries(link, matrix)]
+            lines += [f"{a}, {i}, {b}, {j}, {card_real(x)}" for a, i, b, j, x in _upper_entries(link, matrix)]
     if used:
         lines.append("*MATRIX ASSEMBLE, " + ", ".join(used))
     return lines
@@ -571,7 +608,9 @@ def _abaqus_matrices(link: _Link) -> list[str]:
 def _calculix(link: _Link) -> list[str]:
     """Springs that add up to the matrix: SPRING2 for each entry off the diagonal, SPRING1 for what a row sums up to."""
     if link.damping.any() or link.hysteretic.any():
-        raise ValueError("calculix has no dashpot between DOFs and no complex spring: damping=False leaves damping out")
+        raise ValueError(
+            "calculix has no dashpot between DOFs and no complex spring; leave damping out with damping=False"
+        )
     whole = link.both_sides(link.stiffness)
     at = link.calculix_dof
     springs: list[tuple[list[tuple[int, int]], float]] = []
@@ -583,26 +622,14 @@ def _calculix(link: _Link) -> list[str]:
     for i, (ends, k) in enumerate(springs):
         name = f"JOINT{link.number}_{i + 1}"
         lines += [f"*ELEMENT, TYPE=SPRING{len(ends)}, ELSET={name}"]
-        lines += [", ".join(map(str, (link.element + i, *(node for node, _ in ends))))]
-        lines += [f"*SPRING, ELSET={name}", ", ".join(str(dof) for _, dof in ends), _real(k)]
+        lines += [", ".join(map(str, (card_integer("element", link.element + i), *(node for node, _ in ends))))]
+        lines += [f"*SPRING, ELSET={name}", ", ".join(str(dof) for _, dof in ends), card_real(k)]
     return lines
-
-
-def _field(value: float) -> str:
-    """As many digits as 16 columns hold: the exponent without E and without zeros in front."""
-    if value == 0:
-        return "0.0"
-    for digits in range(13, 8, -1):
-        mantissa, exponent = f"{value:.{digits}E}".split("E")
-        text = f"{mantissa}{int(exponent):+d}"
-        if len(text) <= 16:
-            return text
-    raise ValueError(f"{value:g} does not fit into a field of 16 columns")
 
 
 def _large(first: str, fields: Sequence[str | int | float]) -> list[str]:
     """Lines of a large-field card, four fields of 16 columns each."""
-    words = [_field(x) if isinstance(x, float) else str(x) for x in fields]
+    words = [(card_real(x, _WIDE, "") if x else "0.0") if isinstance(x, float) else str(x) for x in fields]
     rows = [words[i : i + 4] for i in range(0, len(words), 4)]
     return [
         f"{first + '*' if i == 0 else '*':<8}" + "".join(f"{word:>16}" for word in row).rstrip()
@@ -614,8 +641,8 @@ def _nastran_bush(link: _Link) -> list[str]:
     k, c, h = (matrix.diagonal() for matrix in link.matrices)
     if link.table is not None and (_coupled(link) or not link.has_one_point):
         raise ValueError(
-            "PBUSHT of nastran holds tables of single directions at one point: terms between directions, or reference "
-            "points that are apart, have none"
+            "PBUSHT of nastran has tables of single directions at one point; leave out terms between directions and "
+            "reference points that are apart"
         )
     if ((k == 0) & (h != 0)).any():
         return _nastran_matrices(link)  # GE is a multiple of K
@@ -654,7 +681,7 @@ def _bush_tables(link: _Link) -> list[str]:
         numbers: list[str | int | float] = []
         for i in range(6):
             values = matrices[:, i, i]
-            numbers.append(number if values.any() else "")
+            numbers.append(card_integer("number", number) if values.any() else "")
             if values.any():
                 pairs = [float(x) for pair in zip(link.table.freq, values, strict=True) for x in pair]
                 tables += _large("TABLED1", [number, "", "", "", "", "", "", "", *pairs, "ENDT"])
@@ -697,7 +724,7 @@ def _nastran_matrices(link: _Link) -> list[str]:
     names = {"K2GG": f"KJ{link.number}", "B2GG": f"BJ{link.number}", "K42GG": f"HJ{link.number}"}
     used = [(command, names[command], m) for command, m in zip(names, link.matrices, strict=True) if m.any()]
     if any(len(name) > 8 for _, name, _ in used):
-        raise ValueError("number must have at most six digits: it is part of a name of eight characters")
+        raise ValueError("number must have at most six digits, as a part of a name of eight characters")
     lines = [*link.comments("$"), "$ case control: " + ", ".join(f"{command} = {name}" for command, name, _ in used)]
     for _, name, matrix in used:
         lines.append(f"DMIG    {name:<8}{0:8d}{6:8d}{2:8d}{0:8d}")
@@ -715,18 +742,18 @@ def _nastran_matrices(link: _Link) -> list[str]:
 def _ansys(link: _Link) -> list[str]:
     """MATRIX27 elements: the upper triangle row by row, UX ... ROTZ of node j, then of node k."""
     if link.hysteretic.any():
-        raise ValueError("MATRIX27 of ansys has no hysteretic damping: damping=False leaves damping out")
+        raise ValueError("MATRIX27 of ansys has no hysteretic damping; leave damping out with damping=False")
     lines = [*link.comments("!"), "! directions are those of the nodal coordinate systems"]
     i = 0
     for option, matrix in ((4, link.stiffness), (5, link.damping)):
         if not matrix.any():
             continue
-        constants = [f"{value:.12E}" if value else "0" for value in link.both_sides(matrix)[np.triu_indices(12)]]
-        kind = link.number + i
+        constants = [card_real(value, 19) if value else "0" for value in link.both_sides(matrix)[np.triu_indices(12)]]
+        kind, element = card_integer("number", link.number + i), card_integer("element", link.element + i)
         lines.append(f"ET,{kind},MATRIX27,,0,{option}")
         for first in range(0, len(constants), 6):
             head = f"R,{kind}," if first == 0 else "RMORE,"
             lines.append(head + ",".join(constants[first : first + 6]))
-        lines += [f"TYPE,{kind}", f"REAL,{kind}", f"EN,{link.element + i},{link.nodes[0]},{link.nodes[1]}"]
+        lines += [f"TYPE,{kind}", f"REAL,{kind}", f"EN,{element},{link.nodes[0]},{link.nodes[1]}"]
         i += 1
     return lines

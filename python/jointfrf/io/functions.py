@@ -258,10 +258,10 @@ def _columns(record: Mapping[str, Any], where: str, others: Counter[str]) -> Ite
             continue
         if kind != "coherence" and not unit:
             unit = _unit(y_values)
-        labels = (None if own is None else own[i] for own in names)
+        response, excitation = (None if own is None else own[i] for own in names)
         is_coherence = kind == "coherence"
         own_unit = "" if is_coherence else unit
-        yield _Column(freq_hz, columns[:, i], is_coherence, own_unit, *labels, _frequency_unit(x_values))
+        yield _Column(freq_hz, columns[:, i], is_coherence, own_unit, response, excitation, _frequency_unit(x_values))
 
 
 def _kind(name: str) -> str:

@@ -14,7 +14,8 @@ from jointfrf.dofs import DIRECTIONS
 from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit, check_file, damage_named, head_of
 from jointfrf.io.npz_file import npz_fields
-from jointfrf.io.uff_file import UniversalFile
+from jointfrf.io.uff_axes import node_axes
+from jointfrf.io.uff_file import UniversalFile, name_some
 from jointfrf.io.units import ModelUnits
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
@@ -35,8 +36,8 @@ _KNOWN = {
 }
 #: Modes below are rigid motions, Hz: FE programs give them as rounding of zero.
 _RIGID_HZ = 1e-2
-#: Columns of a number; words of a value of a node by the kind of data.
-_COLUMNS, _WORDS = 13, {2: 1, 4: 1, 5: 2, 6: 2}
+#: Columns of a whole and of a real number where no blanks are between them; words of a value by the kind of data.
+_WHOLE, _REAL, _WORDS = 10, 13, {2: 1, 4: 1, 5: 2, 6: 2}
 #: Normal modes, complex modes by displacement.
 _NORMAL, _COMPLEX = 2, 3
 #: The driving point of a mode must not move less than this share of where it moves most.
@@ -121,15 +122,15 @@ def _check(path: Path, found: ModesFile) -> None:
     """Raise an error for numbers that are none, or damping that is not that of a structure."""
     parts = [one for one in vars(found).values() if isinstance(one, np.ndarray) and one is not found.damping]
     if not all(np.isfinite(one).all() for one in parts) or (found.frequency < 0).any():
-        raise FileContentError(f"{path} holds modes with numbers that are not finite, or negative frequencies")
+        raise FileContentError(f"{path} contains modes with numbers that are not finite, or negative frequencies")
     if (abs(found.damping) >= 1).any() or (found.damping < 0).any():
-        raise FileContentError(f"{path} holds modes with damping ratios that are not between 0 and 1")
+        raise FileContentError(f"{path} contains modes with damping ratios that are not between 0 and 1")
     for name, scale in (("modal mass", found.modal_mass), ("modal A", found.scale)):
         if scale is not None and not scale.all():
             number = int(np.argmin(abs(scale))) + 1
             raise FileContentError(f"{path}: mode {number} has no {name}, so that its shape has no scale")
     if found.modal_mass is not None and (found.modal_mass < 0).any():
-        raise FileContentError(f"{path} holds negative modal masses")
+        raise FileContentError(f"{path} contains negative modal masses")
 
 
 def _of_universal(file: UniversalFile, units: ModelUnits | None) -> ModesFile:
@@ -152,12 +153,13 @@ def _of_universal(file: UniversalFile, units: ModelUnits | None) -> ModesFile:
         mode["scale"] *= force * length
         modes.append(mode)
     if not modes:
-        raise file.error("holds no modes: no dataset 55 or 2414 of normal or complex modes")
+        raise file.error("contains no modes: no dataset 55 or 2414 of normal or complex modes")
     kinds = {mode["kind"] for mode in modes}
     dofs = tuple(modes[0]["shape"])
     if len(kinds) > 1 or any(set(mode["shape"]) != set(dofs) for mode in modes):
-        raise file.error("holds modes of different kinds, or of different nodes")
+        raise file.error("contains modes of different kinds, or of different nodes; write one kind for all nodes")
     shapes = np.array([[mode["shape"][dof] for mode in modes] for dof in dofs])
+    dofs, shapes = _in_global_axes(file, dofs, shapes)
     scale = np.array([mode["scale"] for mode in modes])
     frequency, damping = (np.array([mode[name] for mode in modes]) for name in ("frequency", "damping"))
     more: dict[str, Any] = {"dofs": dofs, "notes": file.notes(), "has_nodes": bool(file.datasets(15, 2411))}
@@ -166,17 +168,38 @@ def _of_universal(file: UniversalFile, units: ModelUnits | None) -> ModesFile:
     return ModesFile(frequency, damping, shapes, scale=scale.astype(complex), **more)
 
 
+def _in_global_axes(
+    file: UniversalFile, dofs: tuple[str, ...], shapes: NDArray[Any]
+) -> tuple[tuple[str, ...], NDArray[Any]]:
+    """Turn the motions of nodes that have axes of their own; where these are unknown, directions are ``local_x``."""
+    found, names = shapes.copy(), list(dofs)
+    number = {dof: i for i, dof in enumerate(dofs)}
+    axes = node_axes(file, {int(dof.partition(":")[0]) for dof in dofs})
+    for node, turn in axes.items():
+        for three in (DIRECTIONS[:3], DIRECTIONS[3:]):
+            own = [number[f"{node}:{way}"] for way in three if f"{node}:{way}" in number]
+            if turn is None:
+                names = [f"{node}:local_{three[own.index(i)]}" if i in own else name for i, name in enumerate(names)]
+            elif own:
+                found[own] = turn.T @ shapes[own]
+    lost = [node for node, turn in axes.items() if turn is None]
+    if lost:
+        what = f"directions at {name_some('node', lost)} are local, named local_x, ...: their axes are not known"
+        file.note(what, *file.datasets(15, 2411))
+    return tuple(names), found
+
+
 def _dataset_55(records: list[str]) -> dict[str, Any] | None:
     """Return one mode; None where the dataset holds something else."""
-    _, kind, _, _, data, values = _integers(records[5])
+    _, kind, _, _, data, values = _integers(records[5])[:6]
     words = _numbers(records[7])
     return _mode(kind, words[:4], words[:4]) | {"shape": _shape(records[8:], data, values)} if _is_mode(kind) else None
 
 
 def _dataset_2414(records: list[str]) -> dict[str, Any] | None:
     """Return one mode; None where the dataset holds something else, or not at nodes."""
-    _, kind, _, _, data, values = _integers(records[8])
-    if not _is_mode(kind) or int(records[2][:10]) != 1:
+    _, kind, _, _, data, values = _integers(records[8])[:6]
+    if not _is_mode(kind) or _integers(records[2])[0] != 1:
         return None
     _, frequency, _, *normal = _numbers(records[11])
     return _mode(kind, [frequency, *normal], _numbers(records[12])) | {"shape": _shape(records[13:], data, values)}
@@ -214,7 +237,7 @@ def _shape(records: list[str], data: int, values: int) -> dict[str, complex | fl
     shape: dict[str, complex | float] = {}
     count, at = values * _WORDS[data], 0
     while at < len(records):
-        node, at = int(records[at][:10]), at + 1
+        node, at = _integers(records[at])[0], at + 1
         entry: list[float] = []
         while len(entry) < count:
             entry += _numbers(records[at])
@@ -227,12 +250,23 @@ def _shape(records: list[str], data: int, values: int) -> dict[str, complex | fl
 
 
 def _integers(line: str) -> list[int]:
-    return [int(line[10 * i : 10 * i + 10]) for i in range(6)]
+    return [int(word) for word in _words(line, _WHOLE, int)]
 
 
 def _numbers(line: str) -> list[float]:
-    line = line.rstrip()
-    return [float(line[at : at + _COLUMNS]) for at in range(0, len(line), _COLUMNS)]
+    return [float(word) for word in _words(line, _REAL, float)]
+
+
+def _words(line: str, width: int, kind: type[int | float]) -> list[str]:
+    """Return the numbers of a line, between blanks; by columns where numbers touch."""
+    words = line.split()
+    try:
+        for word in words:
+            kind(word)
+    except ValueError:
+        text = line.rstrip()
+        return [text[at : at + width] for at in range(0, len(text), width)]
+    return words
 
 
 def _of_arrays(path: Path, fields: Mapping[str, NDArray[Any]]) -> ModesFile:
@@ -251,12 +285,14 @@ def _of_arrays(path: Path, fields: Mapping[str, NDArray[Any]]) -> ModesFile:
             shapes, reference = np.asarray(own["shapes"]), None
             if own["modal_mass"] is None:
                 raise FileContentError(
-                    f"{path} holds shapes without modal_mass: shapes of an operational analysis have no scale, those "
-                    "of unit modal mass need modal_mass = 1 for each mode"
+                    f"{path} contains shapes without modal_mass, so without a scale; add modal_mass, 1 for each mode "
+                    "of unit modal mass"
                 )
             mass, scale = np.broadcast_to(np.asarray(own["modal_mass"], float), (count,)).copy(), None
         else:
-            raise FileContentError(f"{path} must hold residues, or shapes and modal_mass; it holds {', '.join(fields)}")
+            raise FileContentError(
+                f"{path} must contain residues, or shapes and modal_mass; it contains {', '.join(fields)}"
+            )
     if shapes.ndim != 2 or shapes.shape[1] != count:
         size = " x ".join(map(str, shapes.shape))
         raise FileContentError(f"{path}: shapes or residues must be DOFs x {count} modes, not {size}")
@@ -270,12 +306,12 @@ def _frequencies(path: Path, own: Mapping[str, NDArray[Any] | None]) -> tuple[Fl
     if own["poles"] is not None:
         poles = np.asarray(own["poles"], complex).ravel()
         if (poles.imag < 0).any():
-            raise FileContentError(f"{path} must hold poles of the upper half plane only, in rad/s")
+            raise FileContentError(f"{path} must contain poles of the upper half plane only, in rad/s")
         size = np.where(poles == 0, 1, abs(poles))
         hertz: FloatArray = np.asarray(abs(poles) / (2 * np.pi), float)
         return hertz, np.asarray(-poles.real / size, float)
     if own["frequency"] is None:
-        raise FileContentError(f"{path} must hold poles, or frequencies and damping")
+        raise FileContentError(f"{path} must contain poles, or frequencies and damping")
     frequency: FloatArray = np.asarray(own["frequency"], float).ravel()
     damping = own["damping"]
     none = np.full(frequency.size, np.nan)
@@ -293,7 +329,7 @@ def _factors(path: Path, residues: ComplexArray, reference: NDArray[Any] | None)
         columns = residues[:, at, np.arange(residues.shape[2])]
         return columns / np.sqrt(columns[at, np.arange(at.size)]), None
     if reference is None or np.size(reference) != 1:
-        raise FileContentError(f"{path} must hold driving_point, which of its rows is that of the force, from 0")
+        raise FileContentError(f"{path} must contain driving_point, the row of the force counted from 0")
     point = int(np.ravel(reference)[0])
     if not 0 <= point < len(residues):
         raise FileContentError(f"{path}: driving_point must be one of its {len(residues)} rows, from 0")

@@ -21,7 +21,8 @@ from jointfrf.io.arrays import contradiction, finite_frfs
 from jointfrf.io.file_format import TIME_DATA, FileFormat, Reading
 from jointfrf.io.functions import difference_of, repetition_note
 from jointfrf.io.labels import DIRECTION_CODES, ChannelNamer
-from jointfrf.io.uff_file import UniversalFile, name_some, node_coordinates
+from jointfrf.io.uff_axes import NodeAxes, global_channels, node_axes, node_coordinates
+from jointfrf.io.uff_file import UniversalFile, name_some
 from jointfrf.io.uff_function import (
     DELIMITER,
     FunctionHeader,
@@ -147,12 +148,15 @@ def read_uff(
         Something was left out; each is reported once, with its datasets. Left out are a dataset that the end of the
         file cuts short, FRFs without node or direction, of unknown kind or not of motion per force (if no others
         remain, that is an error), further FRFs between the same channels, a line at 0 Hz that is not a number, local
-        coordinates, coordinates without a unit.
+        coordinates, coordinates without a unit, FRFs in local directions that cannot be turned.
 
     Notes
     -----
     Units come from the labels of dataset 58. If there are none, the values are divided by the length and force factors
     of dataset 164, as its definition [1]_ says; coordinates always are. A label that is not understood is an error.
+
+    Directions of nodes with a displacement system of their own (datasets 15, 2411, 18, 2420) become global ones. Axes
+    along global ones rename the channels. Others need all three directions of a node, as responses or as forces.
 
     References
     ----------
@@ -196,11 +200,14 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfSet:
     if h is None:
         limit.take(matrix.bytes(freq_hz.size))
         h = np.full((freq_hz.size, *matrix.shape), np.nan + 0j)
-    coordinates = _coordinates(file, content, {channel.node for pair in pairs for channel in pair})
+    at = {channel.node for pair in pairs for channel in pair}
+    coordinates, axes = _coordinates(file, content, at), _axes(file, content, at)
+    responses, excitations = matrix.responses, matrix.excitations
+    if axes:
+        limit.take(matrix.bytes(freq_hz.size))
+        responses, excitations, h, coherence = _in_global_axes(file, axes, matrix, h, coherence)
     stated = _some(frf.stated for frf in first)
-    found = FrfSet(
-        freq_hz, matrix.responses, matrix.excitations, h, common, coordinates, str(path), coherence, None, stated
-    )
+    found = FrfSet(freq_hz, responses, excitations, h, common, coordinates, str(path), coherence, None, stated)
     left_out: list[str] = []
     if first:
         try:
@@ -220,6 +227,38 @@ def _coordinates(file: UniversalFile, content: _Content, wanted: Collection[int]
     if shared and file.datasets(15, 2411):
         file.note(f"coordinates of {name_some('node', shared)} are left out: several components have these numbers")
     return {number_of[node]: place for node, place in places.items()}
+
+
+def _axes(file: UniversalFile, content: _Content, wanted: Collection[int]) -> dict[int, NDArray[np.float64] | None]:
+    """Axes of nodes of the set whose displacement system is not global; unknown if several components have a node."""
+    found = node_axes(file, set(content.numbered))
+    return {
+        number: axes if len(content.numbered[node]) == 1 else None
+        for node, axes in found.items()
+        for number in content.numbered[node]
+        if number in wanted
+    }
+
+
+def _in_global_axes(
+    file: UniversalFile,
+    axes: NodeAxes,
+    matrix: _Matrix,
+    h: NDArray[np.complex128],
+    coherence: NDArray[np.float64] | None,
+) -> tuple[tuple[Channel, ...], tuple[Channel, ...], NDArray[np.complex128], NDArray[np.float64] | None]:
+    """Return channels, FRFs and coherences in global directions; a sum of channels has no coherence."""
+    rows, responses, h = global_channels(file, axes, matrix.responses, h)
+    columns, excitations, h = global_channels(file, axes, matrix.excitations, h.swapaxes(1, 2))
+    if not (responses and excitations):
+        raise file.error(
+            "holds FRFs in local directions only; set the displacement system of the nodes to 0 and state directions "
+            "in a channel table"
+        )
+    if coherence is not None:
+        unknown = (np.array(rows) < 0)[:, None] | (np.array(columns) < 0)
+        coherence = np.where(unknown, np.nan, coherence[:, rows][:, :, columns])
+    return responses, excitations, h.swapaxes(1, 2), coherence
 
 
 class _Matrix:

@@ -45,6 +45,7 @@ RCOND_LIMIT = 1e-12
 #: Values of `LineStatus.line_info`, and of `info`, as in `status.f90`.
 _LINE_NOT_FINITE = -1
 _LINE_OVERFLOW = -2
+_LINE_SINGULAR = 1  # or any other number above 0, LAPACK's INFO
 #: Version of the kernel, and so of the package.
 VERSION = ".".join(str(int(number)) for number in _kernel.jf_version())
 #: Value of `info` where this processor cannot run the engine, as in `status.f90`.
@@ -161,6 +162,7 @@ def run(
     on_singular: OnSingular,
     rcond_limit: float = RCOND_LIMIT,
     out: ComplexArray | None = None,
+    singular_rcond: float = 0.0,
 ) -> tuple[ComplexArray, LineStatus]:
     """Call a kernel routine.
 
@@ -185,6 +187,8 @@ def run(
     out : ndarray or None
         Where the result goes. All lines are done before a bad one raises: `out` then holds the good lines, and NaN in
         the bad ones.
+    singular_rcond : float
+        Below this reciprocal condition number a line is singular to working precision, as in LAPACK's expert drivers.
 
     Returns
     -------
@@ -205,6 +209,10 @@ def run(
             _check_info(routine, n_bad)
         else:
             n_bad = _run_in_chunks(routine, kernel, args, result, status, sweeps)
+        if status.lowest_rcond < singular_rcond:
+            lost = (status.line_info == 0) & (status.rcond < singular_rcond)
+            n_bad += int(lost.sum())
+            result[lost], status.line_info[lost], status.rcond[lost] = np.nan, _LINE_SINGULAR, 0
         check_status(routine, status, n_bad, sweeps, freq_hz, on_singular, rcond_limit)
     return result, status
 

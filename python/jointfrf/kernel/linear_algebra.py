@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_lines, as_square, optional_frequency
 from jointfrf.kernel.call import N_FREQ, OnSingular, run
 
-__all__ = ["invert", "reciprocal_condition", "solve"]
+__all__ = ["invert", "reciprocal_condition", "solve", "solve_lines"]
 
 
 def invert(
@@ -134,3 +134,11 @@ def solve(
     freq = optional_frequency(freq_hz, n_freq)
     args = (n, right.shape[2], N_FREQ, lines, right)
     return run("solve", args, right.shape, {"a": lines, "b": right}, freq, on_singular, out=out)[0]
+
+
+def solve_lines(
+    a: ComplexArray, b: ComplexArray, freq_hz: FloatArray | None, on_singular: OnSingular, singular_rcond: float
+) -> ComplexArray:
+    """Solve as `solve` does for checked arrays; below `singular_rcond` a line is singular."""
+    args = (a.shape[1], b.shape[2], N_FREQ, a, b)
+    return run("solve", args, b.shape, {"a": a, "b": b}, freq_hz, on_singular, singular_rcond=singular_rcond)[0]

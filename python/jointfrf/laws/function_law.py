@@ -78,7 +78,9 @@ class FunctionLaw(JointLaw):
         try:
             named = tuple(LawField(*field) for field in fields)
         except TypeError as error:
-            raise TypeError("fields must hold name, kind and bounds of each parameter, as LawField has them") from error
+            raise TypeError(
+                "fields must contain name, kind and bounds of each parameter, as LawField has them"
+            ) from error
         for field in named:
             check_type("name of a parameter", field.name, str)
             check_choice("kind of a parameter", field.kind, _KINDS)

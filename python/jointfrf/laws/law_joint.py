@@ -126,7 +126,7 @@ class LawJoint:
             if a not in moving or b not in moving:
                 raise ValueError(f"the cross term {a},{b} must be between two DOFs that have laws")
             if a != b and (b, a) in by_pair:
-                raise ValueError(f"the cross term {a},{b} is there twice: it is symmetric")
+                raise ValueError(f"the cross term {a},{b} is there twice; name it once")
         masses = {dof: as_number(f"mass of {dof}", value) for dof, value in (mass or {}).items()}
         for dof, value in masses.items():
             if dof not in names:
@@ -294,7 +294,7 @@ class LawJoint:
             terms = law.constant_terms
             if terms is None and freq_hz is None:
                 raise ValueError(
-                    f"{type(law).__name__} of {','.join(dict.fromkeys(pair))} depends on frequency: name the freq_hz "
+                    f"{type(law).__name__} of {','.join(dict.fromkeys(pair))} depends on frequency; name the freq_hz "
                     "at which it is taken"
                 )
             if terms is None:
@@ -346,7 +346,7 @@ class LawJoint:
         """
         table_hz = options.get("table_hz")
         if table_hz is not None and freq_hz is not None:
-            raise ValueError("freq_hz takes laws at one frequency, table_hz over many: name one of them")
+            raise ValueError("freq_hz takes laws at one frequency, table_hz over many; name one of them")
         springs = None
         if self.laws:
             springs = LawJoint(self.laws) if table_hz is not None else LawJoint(self.laws).constant_joint(freq_hz)
@@ -361,7 +361,7 @@ class LawJoint:
         )
         comment = {"abaqus": "**", "calculix": "**", "nastran": "$", "ansys": "!"}.get(program, "")
         if self.mass and options.get("positions") is not None:
-            raise ValueError("point masses are written at the nodes: leave positions out")
+            raise ValueError("point masses are written at the nodes; leave positions out")
         note = f"{comment} {', '.join(varying)} at {freq_hz:g} Hz" if varying else ""
         text = f"{note}: stiffness and hysteretic damping of that frequency hold there only\n" if note else ""
         number, element = options.get("number", 1), options.get("element", 1)
@@ -414,21 +414,29 @@ def _masses(
 ) -> str:
     """Return half of the mass of the joint on either node, alike in all directions."""
     if any(int(place) > 2 for place in direction_places(list(mass))):
-        raise ValueError("rotary inertia of a joint cannot be written: a point mass has none")
+        raise ValueError("rotary inertia of a joint cannot be written, as a point mass has none; leave it out")
     values = set(mass.values())
     if len(values) > 1:
         raise ValueError(f"a point mass is the same in all directions: those of {', '.join(mass)} differ")
+    from jointfrf.io.cards import card_integer, card_real  # readers of files take their time to import
+
     half = values.pop() / 2
     element, number = numbers
     lines = [f"{comment} half of the mass of the joint on each node, in all directions, written by jointfrf"]
     for i, node in enumerate(nodes):
-        own = element + i
+        own = card_integer("element", element + i)
         if program in ("abaqus", "calculix"):
             name = f"JOINT{number}_M{i + 1}"
-            lines += [f"*ELEMENT, TYPE=MASS, ELSET={name}", f"{own}, {node}", f"*MASS, ELSET={name}", f"{half:.13E}"]
+            lines += [f"*ELEMENT, TYPE=MASS, ELSET={name}", f"{own}, {node}", f"*MASS, ELSET={name}", card_real(half)]
         elif program == "nastran":
-            lines += [f"CONM2*  {own:16d}{node:16d}{0:16d}{half:16.9E}", "*"]
+            lines += [f"CONM2*  {own:16d}{node:16d}{0:16d}{card_real(half, 16, ''):>16}", "*"]
         else:
-            lines += [f"ET,{number + 50 + i},MASS21,,,2", f"R,{number + 50 + i},{half:.13E}",
-                      f"TYPE,{number + 50 + i}", f"REAL,{number + 50 + i}", f"E,{node}"]  # fmt: skip
+            kind = card_integer("number", number + 50 + i)
+            lines += [
+                f"ET,{kind},MASS21,,,2",
+                f"R,{kind},{card_real(half)}",
+                f"TYPE,{kind}",
+                f"REAL,{kind}",
+                f"E,{node}",
+            ]
     return "\n".join(lines) + "\n"

@@ -271,7 +271,7 @@ def reduce_model(
     """
     matrices.check_symmetric("method 'krylov' cannot be used, 'sparse' or 'dense' can")
     if matrices.proportional is None:
-        raise ValueError("damping couples the modes: method 'krylov' cannot be used, 'sparse' or 'dense' can")
+        raise ValueError("damping couples the modes, which 'krylov' cannot do; use method 'sparse' or 'dense'")
     task = _Reducer(freq_hz, matrices, outputs, inputs, tolerance)
     low, high = float(freq_hz.min()), float(freq_hz.max())
     place = (1 - np.cos(np.pi * (np.arange(_FIRST_SHIFTS) + 0.5) / _FIRST_SHIFTS)) / 2

@@ -87,10 +87,7 @@ class ModelMatrices:
             half = _half(matrix)
             # Beside a stiffness that is not symmetric, as with rotors or friction, half a matrix may be meant.
             if half is not None and (name == "stiffness" or self.is_symmetric("stiffness")):
-                raise ValueError(
-                    f"{name} holds its {half} triangle only, as files of symmetric matrices do: complete it by "
-                    "from_triangle"
-                )
+                raise ValueError(f"{name} holds its {half} triangle only; complete it by from_triangle")
 
     def dense(self, name: str) -> FloatArray | None:
         """Return a matrix as an array, shape (n, n); None where the model has none."""
@@ -207,7 +204,7 @@ def from_triangle(matrix: Matrix) -> Matrix:
         raise ValueError(f"matrix must have shape (n, n), not {tuple(whole.shape)}")
     below, above = _sides(whole)
     if below and above:
-        raise ValueError("matrix has entries on both sides of the diagonal: it is whole already")
+        raise ValueError("matrix has entries on both sides of the diagonal; it is whole already")
     if sparse.issparse(whole):
         return whole + whole.T - sparse.diags_array(whole.diagonal())
     return whole + whole.T - np.diag(np.diagonal(whole))

@@ -320,7 +320,7 @@ def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> tuple[M
     try:
         squared, shapes = eigh(k, m)
     except np.linalg.LinAlgError as error:
-        raise ValueError("mass is not positive definite: method 'modal' cannot be used") from error
+        raise ValueError("mass is not positive definite; use another method than 'modal'") from error
     rigid = find_rigid_modes(matrices.operand("stiffness"), matrices.operand("mass"))
     shapes = np.hstack([rigid.shapes, rigid.strains(shapes[:, len(rigid) :])])
     stiffness = np.concatenate([rigid.stiffness, np.maximum(squared[len(rigid) :], 0)])
@@ -334,7 +334,7 @@ def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> tuple[M
         diagonal = np.diagonal(projected).copy()
         rest = abs(projected - np.diag(diagonal)).max(initial=0)
         if rest > _DIAGONAL * abs(diagonal).max(initial=0):
-            raise ValueError(f"{name} couples the modes: method 'modal' cannot be used, 'dense' or 'sparse' can")
+            raise ValueError(f"{name} couples the modes, which 'modal' cannot do; use method 'dense' or 'sparse'")
         return diagonal
 
     structural = modal("structural_damping")

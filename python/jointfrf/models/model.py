@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from scipy import linalg, sparse
 from scipy.sparse import linalg as sparse_linalg
 
+from jointfrf.dofs import similar_dof
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_dofs, as_names, as_real, check_choice, check_type
 from jointfrf.laws.law_joint import LawJoint
@@ -79,7 +80,8 @@ class Model:
         """
         for name in as_names("names", names):
             if name not in self.dofs:
-                raise ValueError(f"the model has no DOF {name!r}; it has {self.dofs[0]!r} to {self.dofs[-1]!r}")
+                hint = similar_dof(name, self.dofs) or f"; use one of {self.dofs[0]!r} to {self.dofs[-1]!r}"
+                raise ValueError(f"the model has no DOF {name!r}{hint}")
         found = [self.dofs.index(name) for name in names]
         return found[0] if len(found) == 1 else found
 
@@ -271,10 +273,10 @@ def _constants(joint: Joint | LawJoint) -> tuple[Joint, FloatArray]:
     if isinstance(joint, Joint):
         return joint, np.zeros(len(joint.dofs))
     if joint.rigid:
-        raise ValueError(f"joint: {', '.join(joint.rigid)} is rigid, which adds no spring to matrices: use couple")
+        raise ValueError(f"joint: {', '.join(joint.rigid)} is rigid, which adds no spring to matrices; use couple")
     varying = [type(law).__name__ for law in joint.laws.values() if law.constant_terms is None]
     if varying:
-        raise ValueError(f"joint: a {varying[0]} depends on frequency, which matrices do not: use couple")
+        raise ValueError(f"joint: a {varying[0]} depends on frequency, which matrices do not; use couple")
     springs = LawJoint(joint.laws, dofs=joint.dofs).constant_joint()
     return springs, np.array([joint.mass.get(dof, 0.0) for dof in joint.dofs])
 

@@ -243,7 +243,7 @@ def _followers(model: PointModel, number: Mapping[str, int], patch: PointPatch) 
     seen = np.linalg.svd(whole * np.r_[np.ones(3), np.full(3, 1 / size)], compute_uv=False)
     if len(whole) < 6 or seen[-1] <= _HELD * seen[0]:
         raise ValueError(
-            f"point {patch.name} needs at least three nodes that are not on one line, or nodes with rotations, to hold "
+            f"point {patch.name} cannot rotate with its nodes; give three that are not on one line, or nodes with "
             "rotations"
         )
     return _Followers(dofs, whole, at)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Final, Literal, get_args
 
@@ -26,6 +27,7 @@ __all__ = [
     "BoltedLap",
     "LapDivisions",
     "bolted_lap",
+    "lap_bricks",
     "preload_force",
 ]
 
@@ -315,6 +317,12 @@ def bolted_lap(
     )
 
 
+def lap_bricks(lengths: Sequence[float], height: float) -> float:
+    """Return about how many bricks beams of these lengths take with the default divisions."""
+    bricks = LapDivisions()
+    return bricks.across * bricks.layers * _PER_HEIGHT * sum(lengths) / height
+
+
 def _check_dimensions(
     lengths: tuple[float, float],
     heights: tuple[float, float],
@@ -395,8 +403,8 @@ def _check_quality(name: str, mesh: Mesh) -> None:
     if quality[worst] < _POOR:
         x, y, z = 1e3 * mesh.nodes[mesh.elements[worst]].mean(axis=0)
         raise ValueError(
-            f"divisions: a brick of {name} near x, y, z = {x:.3g}, {y:.3g}, {z:.3g} mm is badly shaped, with a scaled "
-            f"Jacobian of {quality[worst]:.2g} where at least {_POOR} is needed"
+            f"divisions: a brick of {name} near x, y, z = {x:.3g}, {y:.3g}, {z:.3g} mm has a scaled Jacobian of "
+            f"{quality[worst]:.2g}; change divisions to reach {_POOR}"
         )
 
 

@@ -253,7 +253,7 @@ def _element_matrices(
     check_choice("mass", mass, get_args(Mass))
     n = len(coordinates)
     if n == 0:
-        raise ValueError("coordinates must hold at least one element")
+        raise ValueError("coordinates must contain at least one element")
     if as_number("hourglass", hourglass) < 0:
         raise ValueError(f"hourglass must not be negative, not {hourglass}")
     stiffness, inertia, info = np.empty((n, _DOFS, _DOFS)), np.empty((n, _DOFS, _DOFS)), np.empty(n, np.int32)
@@ -266,8 +266,8 @@ def _element_matrices(
         if info[bad] == _OVERFLOW:
             raise OverflowError(f"the matrices of {where} overflow")
         raise ValueError(
-            f"{where} is turned inside out or flat near its node {info[bad]}: nodes 1 to 4 must go round "
-            "counter-clockwise as seen from nodes 5 to 8"
+            f"{where} is turned inside out or flat near its node {info[bad]}; number nodes 1 to 4 counter-clockwise as "
+            "seen from nodes 5 to 8"
         )
     return stiffness, inertia
 

@@ -15,7 +15,7 @@ from jointfrf.solids.brick import Formulation, Material
 from jointfrf.solids.mesh import NEAR, Mesh, Plan, extrude, holed_rectangle, join_plans, rectangle
 from jointfrf.solids.solid import Patch, SolidModel, solid_model
 
-__all__ = ["PRESETS", "Face", "Hole", "Preset", "brick_beam", "holed_plan"]
+__all__ = ["PRESETS", "Face", "Hole", "Preset", "beam_divisions", "brick_beam", "holed_plan"]
 
 Preset = Literal["seed", "accurate"]
 Face = Literal["top", "bottom"]
@@ -130,8 +130,7 @@ def brick_beam(
     for what, places in (("sections", sections), ("observed", observed)):
         if not isinstance(places, Mapping | None):
             raise TypeError(f"{what} must map names to places, not {type(places).__name__}")
-    nx, ny, per_height = _PLAIN if hole is None else _HOLED
-    nz = max(1, round(length / height * per_height))
+    nx, ny, nz = beam_divisions(length, height, holed=hole is not None)
     if divisions is not None:
         if np.shape(divisions) != (3,):
             raise ValueError(f"divisions must be three numbers, along x, y and z, not {reprlib.repr(divisions)}")
@@ -159,6 +158,12 @@ def brick_beam(
         observed=seen,
         clamped=np.concatenate([np.zeros(0, int), *clamped]),
     )
+
+
+def beam_divisions(length: float, height: float, *, holed: bool) -> tuple[int, int, int]:
+    """Return the default numbers of bricks along x, y and z."""
+    nx, ny, per_height = _HOLED if holed else _PLAIN
+    return nx, ny, max(1, round(length / height * per_height))
 
 
 def _mesh(length: float, width: float, height: float, hole: Hole | None, divisions: tuple[int, int, int]) -> Mesh:
@@ -200,8 +205,8 @@ def holed_plan(
     reach = (min(width / 2, position), min(width / 2, length - position), width / 2)
     if not max(radii) < min(reach):
         raise ValueError(
-            f"the hole at {1e3 * position:g} mm, with what surrounds it up to a radius of {1e3 * max(radii):g} mm, "
-            f"does not lie within the beam of {1e3 * length:g} x {1e3 * width:g} mm"
+            f"the hole at {1e3 * position:g} mm with its ring of radius {1e3 * max(radii):g} mm leaves the beam of "
+            f"{1e3 * length:g} x {1e3 * width:g} mm; move or shrink it"
         )
     plans = [holed_rectangle((position, 0.0), reach, radii, nx, _OUTER_LAYERS)]
     across = np.linspace(-width / 2, width / 2, nx + 1)

@@ -382,10 +382,10 @@ class _Problem:
             contacts = after
             for name, part in self.pairs.parts.items():
                 if not contacts.closed[part].any():
-                    raise ValueError(f"interface {name!r} opens everywhere: the load is not carried through it")
+                    raise ValueError(f"interface {name!r} opens everywhere; apply a load that it can carry")
         raise ValueError(
-            f"the contact did not converge in {max_iterations} iterations: {history[-1].changed} of {count} pairs "
-            "still change; more iterations, a finer mesh or a finite tangential stiffness may help"
+            f"the contact did not converge in {max_iterations} iterations, {history[-1].changed} of {count} pairs "
+            "still change; try more iterations, a finer mesh or a tangential stiffness"
         )
 
     def solve(self, contacts: _Contacts) -> tuple[FloatArray, float]:

@@ -68,7 +68,7 @@ class Mesh:
         elements = as_array("elements", self.elements)
         if elements.ndim != 2 or elements.shape[1] != 8 or elements.dtype.kind not in "iu":
             raise ValueError(
-                f"elements must hold eight node numbers each, not {elements.dtype} of shape {elements.shape}"
+                f"elements must contain eight node numbers each, not {elements.dtype} of shape {elements.shape}"
             )
         if elements.size and not (elements.min() >= 0 and elements.max() < len(self.nodes)):
             raise ValueError(f"elements must name nodes 0 to {len(self.nodes) - 1}")
@@ -111,7 +111,7 @@ def rectangle(z: ArrayLike, x: ArrayLike) -> Plan:
     lines = [as_real(name, value, (None,)) for name, value in (("z", z), ("x", x))]
     for name, line in zip("zx", lines, strict=True):
         if line.size < 2 or (np.diff(line) <= 0).any():
-            raise ValueError(f"{name} must hold at least two grid lines in ascending order")
+            raise ValueError(f"{name} must contain at least two grid lines in ascending order")
     grid = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
     number = np.arange(grid[..., 0].size).reshape(grid.shape[:2])
     quads = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1)
@@ -148,8 +148,8 @@ def holed_rectangle(
     as_count("layers", layers)
     if not radii or not _grow([*radii, min(reach)]):
         raise ValueError(
-            f"radii {', '.join(f'{1e3 * r:g}' for r in radii)} mm must grow from the hole outwards and stay within "
-            f"the nearest edge, {1e3 * min(reach):g} mm from its middle"
+            f"radii {', '.join(f'{1e3 * r:g}' for r in radii)} mm must grow from the hole outwards, to less than "
+            f"{1e3 * min(reach):g} mm at the nearest edge"
         )
     circle, square = _around(divisions)
     edge = square * np.where(square[:, :1] < 0, [reach[0], reach[2]], [reach[1], reach[2]])
@@ -242,7 +242,7 @@ def extrude(*parts: tuple[Plan, ArrayLike]) -> Mesh:
     for plan, heights in parts:
         y = as_real("heights", heights, (None,))
         if y.size < 2 or (np.diff(y) <= 0).any():
-            raise ValueError("heights must hold at least two values in ascending order")
+            raise ValueError("heights must contain at least two values in ascending order")
         count = len(plan.points)
         layer = np.empty((y.size, count, 3))
         layer[:, :, 0], layer[:, :, 1], layer[:, :, 2] = plan.points[:, 1], y[:, None], plan.points[:, 0]
@@ -352,7 +352,7 @@ def _rows(count: int, directions: str | Sequence[str] | ArrayLike) -> tuple[NDAr
     vectors = as_real("directions", given, (count, 3))
     length = np.linalg.norm(vectors, axis=1)
     if not length.all():
-        raise ValueError(f"directions must not hold a zero vector, as point {int(length.argmin())} has")
+        raise ValueError(f"directions must not contain a zero vector, as point {int(length.argmin())} has")
     return np.arange(count), vectors / length[:, None]
 
 

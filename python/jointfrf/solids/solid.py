@@ -203,7 +203,7 @@ def _check_patches(mesh: Mesh, patches: Mapping[str, Patch], clamped: NDArray[np
 
 def _check_shape(mesh: Mesh, name: str, nodes: NDArray[np.int32]) -> None:
     if nodes.size == 0:
-        raise ValueError(f"patch {name!r} has no nodes: the mesh is too coarse there, or the patch lies outside")
+        raise ValueError(f"patch {name!r} has no nodes; refine the mesh there, or move the patch inside")
     places = mesh.nodes[nodes] - mesh.nodes[nodes].mean(axis=0)
     size = np.linalg.svd(places, compute_uv=False)
     if nodes.size < 3 or size[1] <= _HELD * size[0]:

@@ -9,11 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jointfrf.dofs import similar_dof
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_names, as_square, check_type, one_line
 from jointfrf.kernel.call import N_FREQ, OnSingular, run
 from jointfrf.laws.law_joint import LawJoint
-from jointfrf.spelling import did_you_mean
+from jointfrf.substructuring.coupling import lost_rcond, redundant_ties
 
 __all__ = ["BodyLink", "FreeBody", "couple_bodies"]
 
@@ -87,6 +88,10 @@ class _Rows(NamedTuple):
     rigid: NDArray[np.int32]
     t: ComplexArray
 
+    def only(self, kept: NDArray[np.bool_]) -> _Rows:
+        """Return some of the rows."""
+        return _Rows(self.ends[kept], self.rigid[kept], self.t[:, kept][:, :, kept])
+
 
 def couple_bodies(
     freq_hz: ArrayLike,
@@ -120,7 +125,9 @@ def couple_bodies(
     Raises
     ------
     SingularLineError
-        The assembly resonates without damping at a line, or rigid connections contradict or repeat each other.
+        The assembly resonates without damping at a line, or rigid connections hold a rigid body more than once: the
+        matrix to be inverted is singular to working precision (its reciprocal condition number is below q times the
+        machine epsilon, with q rows).
     ValueError
         Names that there are not; shapes that do not agree; NaN or Inf in a line.
 
@@ -128,6 +135,9 @@ def couple_bodies(
     -----
     Y = H - H B^T (S + T B H B^T)^-1 T B H: the dual assembly of [1]_ where all is rigid (S = 0, T = 1); S = 1 and
     T = K* for a stiffness. H is block-diagonal: products are those of one body with the rows it has a part in.
+
+    A rigid connection that follows from others (A-B, B-C, C-A) adds nothing and is left out: the signed Boolean matrix
+    B of all rigid rows is the incidence matrix of a graph, whose rank is the size of a spanning forest.
 
     References
     ----------
@@ -149,7 +159,7 @@ def couple_bodies(
     named = _named(bodies, freq.size)
     all_dofs = [f"{name}/{dof}" for name, body in named.items() for dof in body.dofs]
     number = {dof: i for i, dof in enumerate(all_dofs, 1)}
-    rows = [_rows(link, number, freq) for link in _links(links)]
+    rows = _independent([_rows(link, number, freq) for link in _links(links)])
     sizes = np.array([len(body.dofs) for body in named.values()], np.int32)
     h = np.concatenate([np.reshape(body.h, (freq.size, -1)) for body in named.values()], axis=1)
     t = np.concatenate([one.t.reshape(freq.size, -1) for one in rows], axis=1)
@@ -163,7 +173,8 @@ def couple_bodies(
         rigid, h, t, outputs, inputs,
     )  # fmt: skip
     shape = (freq.size, outputs.size, inputs.size)
-    found = run("couple_bodies", args, shape, {"h": h, "links": t}, freq, on_singular)[0]
+    lost = lost_rcond(len(ends))
+    found = run("couple_bodies", args, shape, {"h": h, "links": t}, freq, on_singular, singular_rcond=lost)[0]
     if all((np.diff(at) > 0).all() for at in order):
         return found
     back = np.empty_like(found)
@@ -191,14 +202,14 @@ def _links(links: Iterable[BodyLink]) -> list[BodyLink]:
     for link in listed:
         check_type("links", link, BodyLink)
     if not listed:
-        raise ValueError("links must hold at least one BodyLink: nothing is connected")
+        raise ValueError("links must contain at least one BodyLink")
     return listed
 
 
 def _places(what: str, dofs: Sequence[str], number: Mapping[str, int]) -> NDArray[np.int32]:
     for dof in dofs:
         if dof not in number:
-            raise ValueError(f"{what}: no body has a DOF {one_line(dof)}{did_you_mean(dof, number)}")
+            raise ValueError(f"{what}: no body has a DOF {one_line(dof)}{similar_dof(dof, number)}")
     return np.array([number[dof] for dof in dofs], np.int32)
 
 
@@ -223,6 +234,14 @@ def _rows(link: BodyLink, number: Mapping[str, int], freq_hz: FloatArray) -> _Ro
     places = np.concatenate([first, second])
     plus, minus = (np.abs(own.pattern * (own.pattern * sign > 0)) for sign in (1, -1))
     ends = np.stack([(places @ side).astype(np.int32) for side in (plus, minus)], 1)
-    moves = ends[:, 0] > 0  # half the mass of a joint to the ground moves with it
     rigid = (np.diagonal(own.s, axis1=1, axis2=2)[:1] == 0).any(axis=0).astype(np.int32)
-    return _Rows(ends[moves], rigid[moves], own.t[:, moves][:, :, moves])
+    return _Rows(ends, rigid, own.t).only(ends[:, 0] > 0)  # half the mass of a joint to the ground moves with it
+
+
+def _independent(rows: Sequence[_Rows]) -> list[_Rows]:
+    """Leave out rigid rows that follow from others."""
+    ends, rigid = (np.concatenate(parts) for parts in zip(*((one.ends, one.rigid) for one in rows), strict=True))
+    kept = rigid == 0
+    kept[~kept] = ~redundant_ties(ends[~kept])
+    pieces = np.split(kept, np.cumsum([len(one.ends) for one in rows])[:-1])
+    return [one.only(own) for one, own in zip(rows, pieces, strict=True) if own.any()]

@@ -386,7 +386,7 @@ def _as_sides(gamma: ArrayLike, side_j: VirtualPoint, side_k: VirtualPoint) -> t
     m_j, m_k = side_j.modes.shape[0], side_k.modes.shape[0]
     if lines.shape[1] != m_j + m_k:
         raise ValueError(
-            f"gamma must hold the {m_j} channels of side_j, then the {m_k} of side_k, not {lines.shape[1]}"
+            f"gamma must contain the {m_j} channels of side_j, then the {m_k} of side_k, not {lines.shape[1]}"
         )
     check_finite_lines("gamma", lines)
     return lines, m_j
@@ -399,7 +399,7 @@ def _variance(noise: float | ArrayLike | None, lines: ComplexArray) -> FloatArra
         return as_positive("noise", noise) ** 2 * (lines.real**2 + lines.imag**2)
     variance = as_real("noise", noise, lines.shape)
     if (variance < 0).any():
-        raise ValueError("noise must not hold negative variances")
+        raise ValueError("noise must not contain negative variances")
     return variance
 
 
@@ -418,7 +418,7 @@ def _truncated_inverse(
     """Invert by the singular values asked for: `rank` of them, those above the noise, or all."""
     n_freq, most = lines.shape[0], min(lines.shape[1:])
     if rank is not None and variance is not None:
-        raise ValueError("rank and noise exclude one another: give one of them")
+        raise ValueError("rank and noise exclude one another; give one of them")
     if rank is not None and not 1 <= as_integer("rank", rank) <= most:
         raise ValueError(f"rank must lie between 1 and {most}, the singular values of {name}, not {rank}")
     left, size, right = np.linalg.svd(lines, full_matrices=False)
@@ -451,8 +451,8 @@ def _warn_if_truncated(used: NDArray[np.intp], needed: int) -> None:
     lost = np.flatnonzero(used < needed)
     if lost.size:
         warnings.warn(
-            f"on {lost.size} of {used.size} lines fewer than the {needed} singular values of the equivalent joint "
-            f"are used, down to {used[lost].min()}: a part of it is missing there",
+            f"{lost.size} of {used.size} lines use {used[lost].min()} to {needed - 1} of the {needed} singular values "
+            "of the equivalent joint; give rank, or measure with less noise",
             IdentificationWarning,
             stacklevel=3,
         )

@@ -28,10 +28,13 @@ from jointfrf.kernel.arguments import (
     optional_frequency,
 )
 from jointfrf.kernel.call import N_FREQ, OnSingular, run
-from jointfrf.kernel.linear_algebra import solve
+from jointfrf.kernel.linear_algebra import solve_lines
 from jointfrf.laws.law_joint import Connection, LawJoint
 
-__all__ = ["connect", "connection_forces", "couple", "motions_across", "semm", "semm_standard_error"]
+__all__ = [
+    "connect", "connection_forces", "couple", "lost_rcond", "motions_across", "redundant_ties", "semm",
+    "semm_standard_error",
+]  # fmt: skip
 
 SemmMethod = Literal["original", "extended"]
 
@@ -52,12 +55,65 @@ def connection_forces(
     -------
     ndarray, shape (n_freq, q, q)
         (S + T E^T H E)^-1 T, N/m; S = 0 leaves the dual form of a constraint, S = 1 the form of a modification (2.35).
+
+    Raises
+    ------
+    SingularLineError
+        A line is singular to working precision, unless `on_singular` is "nan".
     """
+    link = _without_redundant(link)
     left = link.s + link.t @ between
     # A constraint and a stiffness have rows of very different size.
     size = abs(left).max(axis=2, keepdims=True)
     size[size == 0] = 1
-    return solve(left / size, link.t / size, freq_hz=freq_hz, on_singular=on_singular)
+    return solve_lines(left / size, link.t / size, freq_hz, on_singular, lost_rcond(left.shape[1]))
+
+
+def lost_rcond(q: int) -> float:
+    """Return the reciprocal condition number below which rounding leaves no digit of the solution of q equations."""
+    return q * float(np.finfo(np.float64).eps)
+
+
+def redundant_ties(ends: NDArray[np.integer]) -> NDArray[np.bool_]:
+    """Return which rigid ties follow from those before them.
+
+    Parameters
+    ----------
+    ends : ndarray of int, shape (m, 2)
+        DOFs that each tie makes equal; one number stands for the ground.
+
+    Notes
+    -----
+    The ties are the incidence matrix of a graph: its rank is the size of a spanning forest, and a tie that closes a
+    cycle adds none.
+    """
+    parent: dict[int, int] = {}
+
+    def root(dof: int) -> int:
+        while (above := parent.get(dof, dof)) != dof:
+            parent[dof] = dof = parent.get(above, above)  # path halving
+        return dof
+
+    found = np.zeros(len(ends), bool)
+    for i, (one, other) in enumerate(ends.tolist()):
+        first, second = root(one), root(other)
+        found[i] = first == second
+        parent[first] = second
+    return found
+
+
+def _without_redundant(link: Connection) -> Connection:
+    """Take the forces of rigid connections that follow from others as zero: S = 1, T = 0 there."""
+    rigid = np.flatnonzero(~link.s.any(axis=(0, 2)))
+    if rigid.size < 2 or not len(link.s):
+        return link
+    dofs = np.where(link.pattern[:, rigid], np.arange(1, len(link.pattern) + 1)[:, None], 0)
+    spare = rigid[redundant_ties(np.sort(np.pad(dofs, [(1, 0), (0, 0)]), axis=0)[-2:].T)]  # 0 for the ground
+    if not spare.size:
+        return link
+    s, t = link.s.copy(), link.t.copy()
+    s[:, spare, spare], t[:, spare] = 1, 0
+    return link._replace(s=s, t=t)
 
 
 def motions_across(h: ComplexArray, pattern: FloatArray) -> ComplexArray:
@@ -145,7 +201,7 @@ def couple(
     j, k = as_dof_pairs(("dofs_a", dofs_a, n_a), ("dofs_b", dofs_b, n_b))
     if isinstance(k_joint, Joint | LawJoint):
         if freq_hz is None:
-            raise ValueError("freq_hz is needed: the stiffness of a joint depends on frequency")
+            raise ValueError("freq_hz is missing, on which the stiffness of a joint depends; give it")
         if len(k_joint.dofs) != j.size:
             raise ValueError(f"the joint has {len(k_joint.dofs)} DOFs, dofs_a and dofs_b name {j.size}")
         if isinstance(k_joint, LawJoint) and (k_joint.rigid or k_joint.mass):
@@ -315,10 +371,10 @@ def semm_standard_error(
     is_square = np.array_equal(expansion.outputs, expansion.inputs)
     if noise is None:
         if freq is None:
-            raise ValueError("freq_hz is needed to find the noise of h_measured: give it, or noise")
+            raise ValueError("freq_hz is missing, from which the noise of h_measured is found; give it, or noise")
         found = estimate_noise(freq, measured, reciprocal=is_square)
         if found.source == "none":
-            raise ValueError("h_measured does not show its noise, by too few lines or too little of it: give noise")
+            raise ValueError("h_measured has too few lines or too little noise to estimate it; give noise")
         variance = found.variance
     elif np.ndim(noise) == 0:
         variance = np.asarray(as_not_negative("noise", noise) ** 2 * abs(measured) ** 2, np.float64)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from jointfrf.errors import FileContentError
-from jointfrf.files import check_file
+from jointfrf.files import check_file, check_stated
 from jointfrf.spelling import look_alike
 
 __all__ = ["TomlTable", "missing_in_words", "read_toml"]
@@ -81,6 +81,10 @@ class TomlTable:
     def wrong(self, key: str, why: str) -> FileContentError:
         """Return the exception that says what is wrong with what a key names."""
         return FileContentError(f"{self.where}: {key}: {why}")
+
+    def check_stated(self, key: str, size: float) -> None:
+        """Check the bytes of memory that a number asks for against the limit of reading; raises FileContentError."""
+        check_stated(f"{self.where}: {key} = {reprlib.repr(self.content.get(key))}", size)
 
     def build(self, builder: Callable[[], _T], key: str = "") -> _T:
         """Call a builder; if it complains, the message names the table and, if given, the key.

@@ -152,7 +152,7 @@ def test_a_joint_by_hand_is_exported():
     assert "! reference point of the joint: (0, 0, 0) mm" in result.stdout
     assert result.stdout.endswith("CERIG,1,11,UXYZ\nCERIG,1,12,UXYZ\nCERIG,2,21,UXYZ\n")
     result = run_command("export", "joint.toml", "nastran:1,2", "--nodes-at", "0,0,0,0,0,20000")
-    assert "a node lies 1e+04 m from the reference point of the joint: positions and points are in m" in result.stderr
+    assert "a node lies 1e+04 m from the reference point of the joint; give positions and points in m" in result.stderr
     assert result.returncode == 2
 
 
@@ -220,11 +220,11 @@ def test_laws_are_exported_as_tables_that_a_straight_line_between_lines_meets(tm
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["ansys:1,2", "--frequency", "5:500"], "ansys has no tables over frequency: --frequency HZ names one"),
+        (["ansys:1,2", "--frequency", "5:500"], "ansys has no tables over frequency; name one frequency by --frequency HZ"),
         (["abaqus:1,2", "--frequency", "500:5"], "must be a frequency above 0 Hz, or LOW:HIGH, not '500:5'"),
-        (["abaqus:1,2"], "depends on frequency: name by --frequency HZ that at which it is taken"),
-        (["nastran:1,2", "--frequency", "5", "--connector"], "are for abaqus, not for nastran: leave --connector out"),
-        (["abaqus:1,2", "--frequency", "5", "--connector"], "--frequency LOW:HIGH gives a table over frequency"),
+        (["abaqus:1,2"], "depends on frequency; name by --frequency HZ that at which it is taken"),
+        (["nastran:1,2", "--frequency", "5", "--connector"], "are for abaqus, not for nastran; leave --connector out"),
+        (["abaqus:1,2", "--frequency", "5", "--connector"], "write a table over frequency by --frequency LOW:HIGH"),
     ],
 )  # fmt: skip
 def test_tables_that_cannot_be_written(tmp_path, words, message):
@@ -256,7 +256,7 @@ WRONG = [
     ([*COUPLE, "--output", "x.npz", "--joint", "no.json"], 1, "there is no file no.json"),
     ([*COUPLE, "--output", "x.npz", "--joint", "b.uff"], 1, "b.uff is no file of a joint"),
     (["decouple", "a.toml", "b.uff", "c.npz", "--j", "5"], 2, "equation ss needs --k and --dofs and --s"),
-    (["export", "joint.toml", "nastran:1"], 2, "is not a program and nodes j and k"),
+    (["export", "joint.toml", "nastran:1"], 2, "must be a program with nodes j and k"),
     (["export", "joint.toml", "abacus:1,2"], 2, "did you mean abaqus?"),
     (["export", "joint.toml", "ansys:1,1"], 2, "names a node twice"),
 ]  # fmt: skip

@@ -48,15 +48,18 @@ MARKETS = [
     (HEAD + "coordinate real general\n4 4 3\n1 1 1.0\n", r"a_k\.mtx cannot be read as a Matrix Market file: "),
     (HEAD + "coordinate real general\n4 4 1\n5 1 1.0\n", r"a_k\.mtx is damaged: it names row or column 5 of 4$"),
     (HEAD + "coordinate real general\n4 4 1\n1 1 x\n", r"a_k\.mtx cannot be read as a Matrix Market file: "),
-    (HEAD + "coordinate complex general\n4 4 1\n1 1 1.0 2.0\n", r"a_k\.mtx must hold real numbers, not complex ones$"),
-    (HEAD + "coordinate pattern general\n4 4 1\n1 1\n", r"a_k\.mtx must hold real numbers, not pattern ones$"),
-    (HEAD + "coordinate real general\n4 5 1\n1 1 1.0\n", r"must hold a square matrix, not one of shape \(4, 5\)$"),
-    (HEAD + "coordinate real general\n0 0 0\n", r"must hold a square matrix, not one of shape \(0, 0\)$"),
+    (
+        HEAD + "coordinate complex general\n4 4 1\n1 1 1.0 2.0\n",
+        r"a_k\.mtx must contain real numbers, not complex ones$",
+    ),
+    (HEAD + "coordinate pattern general\n4 4 1\n1 1\n", r"a_k\.mtx must contain real numbers, not pattern ones$"),
+    (HEAD + "coordinate real general\n4 5 1\n1 1 1.0\n", r"must contain a square matrix, not one of shape \(4, 5\)$"),
+    (HEAD + "coordinate real general\n0 0 0\n", r"must contain a square matrix, not one of shape \(0, 0\)$"),
     (
         HEAD + "coordinate real general\n4 4 1\n2 3 nan\n",
-        r"holds NaN or Inf in row 2, column 3, counted from 1$",
+        r"contains NaN or Inf in row 2, column 3, counted from 1$",
     ),
-    (HEAD + "coordinate real general\n4 4 1\n1 1 1e999\n", r"a_k\.mtx (holds NaN or Inf in row 1|cannot be read)"),
+    (HEAD + "coordinate real general\n4 4 1\n1 1 1e999\n", r"a_k\.mtx (contains NaN or Inf in row 1|cannot be read)"),
     (HEAD + "coordinate real symmetric\n3 3 1\n1 1 1\n", r"mass: \S+a_m\.npz holds 4 DOFs, \S+a_k\.mtx holds 3$"),
     (HEAD + "array real general\n900000000 900000000\n1\n", r"a_k\.mtx cannot be read as a Matrix Market file: "),
     (HEAD + "coordinate real general\n4 4 99999999999999\n1 1 1\n", r"a_k\.mtx cannot be read as a Matrix Market file"),
@@ -82,9 +85,9 @@ def test_a_matrix_of_very_many_dofs_needs_as_many_names(by_matrices):
     [
         (
             changed(0, 2, 5.0),
-            r"a_k\.mtx must hold a symmetric matrix: entry \(.*\) is .*, \(.*\) is [^;]*$",
+            r"a_k\.mtx must contain a symmetric matrix: entry \(.*\) is .*, \(.*\) is [^;]*$",
         ),
-        (np.triu(K), r"must hold a symmetric matrix: .*; it holds one triangle only$"),
+        (np.triu(K), r"must contain a symmetric matrix: .*; it contains one triangle only$"),
     ],
 )
 def test_an_unsymmetric_stiffness(by_matrices, matrix, message):
@@ -103,12 +106,15 @@ NPZ = [
     (lambda path: path.write_bytes(b"PK\3\4" + b"x" * 50), r"a_m\.npz cannot be read as an NPZ file: "),
     (lambda path: path.write_bytes(path.read_bytes()[:300]), r"a_m\.npz cannot be read as an NPZ file: "),
     (lambda path: np.savez(path, np.array([{}], object)), r"a_m\.npz holds Python objects \(arr_0\.npy\), which"),
-    (lambda path: np.savez(path, a=K, b=K), r"a_m\.npz must hold one array, or one called 'mass'; it holds a, b$"),
-    (lambda path: np.savez(path), r"must hold one array, or one called 'mass'; it holds nothing$"),
-    (lambda path: np.savez(path, K[0]), r"a_m\.npz must hold a square matrix, not one of shape \(4,\)$"),
-    (lambda path: np.savez(path, K + 1j), r"a_m\.npz must hold real numbers, not complex ones$"),
-    (lambda path: np.savez(path, np.full((4, 4), "x")), r"a_m\.npz must hold real numbers, not <U1 ones$"),
-    (lambda path: np.savez(path, K * np.inf), r"a_m\.npz holds NaN or Inf in row 1, column 1, counted from 1$"),
+    (
+        lambda path: np.savez(path, a=K, b=K),
+        r"a_m\.npz must contain one array, or one called 'mass'; it contains a, b$",
+    ),
+    (lambda path: np.savez(path), r"must contain one array, or one called 'mass'; it contains nothing$"),
+    (lambda path: np.savez(path, K[0]), r"a_m\.npz must contain a square matrix, not one of shape \(4,\)$"),
+    (lambda path: np.savez(path, K + 1j), r"a_m\.npz must contain real numbers, not complex ones$"),
+    (lambda path: np.savez(path, np.full((4, 4), "x")), r"a_m\.npz must contain real numbers, not <U1 ones$"),
+    (lambda path: np.savez(path, K * np.inf), r"a_m\.npz contains NaN or Inf in row 1, column 1, counted from 1$"),
     (lambda path: sparse.save_npz(path, out_of_range()), r"a_m\.npz (is damaged|cannot be read as an NPZ file)"),
     (lambda path: np.savez(path, -K), r"mass: \S+a_m\.npz must have a diagonal that is not negative, and not zero"),
     (lambda path: np.savez(path, 0 * K), r"mass: \S+a_m\.npz must have a diagonal that is not negative, and not zero"),
@@ -156,7 +162,7 @@ def test_a_wrong_key_of_matrices(by_matrices, old, new, message):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", r"dofs: \S+a_dofs\.txt (is empty|holds no names of DOFs)$"),
+        ("", r"dofs: \S+a_dofs\.txt (is empty|contains no names of DOFs)$"),
         ("1 2\n1 7\n", r"a_dofs\.txt: line 2: a DOF has a number from 1 to 6, not 7$"),
         ("1 2\n1 0\n", r"a_dofs\.txt: line 2: a DOF has a number from 1 to 6, not 0$"),
         ("1 2 3\n", r"a_dofs\.txt: line 1 must be like '12:y' or '12 2', not '1 2 3'$"),

@@ -1,17 +1,25 @@
 """Many bodies and joints coupled at once: against one model of the whole, and two at a time."""
 
+import random
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from scipy.linalg import null_space
 
 import jointfrf as jf
 
 FREQ = np.linspace(1.0, 40.0, 25)
 
 
-def chain_body(masses, springs, dampers) -> jf.FreeBody:
-    model = jf.chain(masses, springs, dampers, ground="both")
-    return jf.FreeBody(model.receptance(FREQ), model.dofs)
+def chains() -> list[jf.Model]:
+    return [
+        jf.chain([2.0, 3.0], [3e3, 2e3, 1e3], [1.0, 1.0, 2.0], ground="both"),
+        jf.chain([1.0, 4.0, 2.0], [2e3, 5e3, 1e3, 1e3], [1.0, 2.0, 1.0, 1.0], ground="both"),
+        jf.chain([5.0], [2e3, 1e3], [3.0, 1.0], ground="both"),
+    ]
 
 
 def whole(m: np.ndarray, k: np.ndarray, c: np.ndarray) -> np.ndarray:
@@ -21,23 +29,14 @@ def whole(m: np.ndarray, k: np.ndarray, c: np.ndarray) -> np.ndarray:
 
 @pytest.fixture
 def bodies() -> dict[str, jf.FreeBody]:
-    return {
-        "A": chain_body([2.0, 3.0], [3e3, 2e3, 1e3], [1.0, 1.0, 2.0]),
-        "B": chain_body([1.0, 4.0, 2.0], [2e3, 5e3, 1e3, 1e3], [1.0, 2.0, 1.0, 1.0]),
-        "C": chain_body([5.0], [2e3, 1e3], [3.0, 1.0]),
-    }
+    return {name: jf.FreeBody(part.receptance(FREQ), part.dofs) for name, part in zip("ABC", chains(), strict=True)}
 
 
 def matrices() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """M, K and C of the three bodies side by side."""
-    parts = [
-        jf.chain([2.0, 3.0], [3e3, 2e3, 1e3], [1.0, 1.0, 2.0], ground="both"),
-        jf.chain([1.0, 4.0, 2.0], [2e3, 5e3, 1e3, 1e3], [1.0, 2.0, 1.0, 1.0], ground="both"),
-        jf.chain([5.0], [2e3, 1e3], [3.0, 1.0], ground="both"),
-    ]
     found = np.zeros((3, 6, 6))
     first = 0
-    for part in parts:
+    for part in chains():
         own = slice(first, first + len(part.dofs))
         for target, matrix in zip(found, (part.mass, part.stiffness, part.damping), strict=True):
             target[own, own] = matrix.toarray() if hasattr(matrix, "toarray") else matrix
@@ -145,11 +144,74 @@ def test_a_ring_of_many_bodies_is_one_matrix(count):
     assert_allclose(jf.couple_bodies(f[:1], one, links), expected[:1], **limit)
 
 
-def test_a_constraint_that_is_there_twice_is_singular(bodies):
-    rigid = jf.LawJoint({}, rigid=["x"])
-    links = [jf.BodyLink(rigid, ["A/2:x"], ["B/1:x"])] * 2
-    with pytest.raises(jf.SingularLineError):
-        jf.couple_bodies(FREQ, bodies, links)
+RIGID = jf.LawJoint({}, rigid=["x"])
+
+
+def test_a_ring_of_rigid_links_is_the_chain_that_it_closes(bodies):
+    chain = [jf.BodyLink(RIGID, ["A/2:x"], ["B/1:x"]), jf.BodyLink(RIGID, ["B/1:x"], ["C/1:x"])]
+    expected = jf.couple_bodies(FREQ, bodies, chain)
+    for more in (["C/1:x", "A/2:x"], ["A/2:x", "C/1:x"], ["B/1:x", "A/2:x"]):
+        ring = [*chain, jf.BodyLink(RIGID, more[:1], more[1:])]
+        assert_allclose(jf.couple_bodies(FREQ, bodies, ring), expected, rtol=1e-12)
+    parts = {name: jf.Substructure(part, exact=True) for name, part in zip("ABC", chains(), strict=True)}
+    ends = [("A/2:x", "B/1:x"), ("B/1:x", "C/1:x"), ("C/1:x", "A/2:x")]
+    joints = {f"joint{i}": jf.PlacedJoint(RIGID, [one], [other]) for i, (one, other) in enumerate(ends)}
+    whole = jf.Assembly.of_parts(parts, joints)
+    names = [f"{name}/{dof}" for name, body in bodies.items() for dof in body.dofs]
+    assert_allclose(whole.receptance(FREQ, names, names), expected, rtol=1e-8, atol=1e-15)
+
+
+@settings(derandomize=True, max_examples=60, deadline=None, database=None)
+@given(
+    ties=st.lists(st.tuples(st.integers(0, 5), st.integers(0, 6)).filter(lambda tie: tie[0] != tie[1]), max_size=9),
+    springs=st.lists(st.tuples(st.integers(0, 5), st.integers(0, 6)).filter(lambda tie: tie[0] != tie[1]), max_size=3),
+    seed=st.integers(0, 99),
+)
+def test_any_rigid_links_are_the_assembly_in_the_null_space_of_their_constraints(ties, springs, seed):
+    """DOF 6 is the ground; the links come in random order."""
+    m, k, c = matrices()
+    names = [f"{name}/{dof}" for name, part in zip("ABC", chains(), strict=True) for dof in part.dofs]
+
+    def link(joint: jf.Joint | jf.LawJoint, tie: tuple[int, int]) -> jf.BodyLink:
+        return jf.BodyLink(joint, [names[tie[0]]], [names[tie[1]]] if tie[1] < 6 else [])
+
+    spring = jf.Joint([2e3], [3.0], ["x"])
+    links = [link(RIGID, tie) for tie in ties] + [link(spring, tie) for tie in springs]
+    if not links:
+        return
+    random.Random(seed).shuffle(links)
+    for one, other in springs:
+        k, c = (own + value * between(one, other if other < 6 else None) for own, value in ((k, 2e3), (c, 3.0)))
+    rows = np.zeros((len(ties), 7))
+    for row, (one, other) in zip(rows, ties, strict=True):
+        row[one], row[other] = 1, -1
+    free = null_space(rows[:, :6]) if ties else np.eye(6)
+    reduced = whole(*(free.T @ own @ free for own in (m, k, c))) if free.size else np.zeros((FREQ.size, 0, 0))
+    expected = free @ reduced @ free.T
+    parts = {name: jf.FreeBody(part.receptance(FREQ), part.dofs) for name, part in zip("ABC", chains(), strict=True)}
+    found = jf.couple_bodies(FREQ, parts, links)
+    assert_allclose(found, expected, rtol=0, atol=1e-9 * max(abs(part.h).max() for part in parts.values()))
+
+
+def test_a_rigid_body_that_is_held_more_than_once_is_singular():
+    body = jf.rigid_body(2.0, [0.1, 0.1, 0.2], {"p": [0.5, 0, 0], "q": [0, 0.5, 0], "r": [0, 0, 0.5]})
+    names = [f"{point}:{direction}" for point in "pqr" for direction in "xyz"]
+    held = {"A": jf.FreeBody(body.receptance(FREQ, names), names)}
+    links = [jf.BodyLink(RIGID, [f"A/{name}"]) for name in names]
+    with pytest.raises(jf.SingularLineError, match="couple_bodies: singular matrix"):
+        jf.couple_bodies(FREQ, held, links)
+    assert np.isnan(jf.couple_bodies(FREQ, held, links, on_singular="nan")).all()
+    six = [0, 1, 2, 4, 5, 8]  # enough to hold it
+    limit = 1e-9 * abs(np.asarray(held["A"].h)).max()
+    assert abs(jf.couple_bodies(FREQ, held, [links[i] for i in six])).max() < limit
+
+
+def test_a_rotation_by_another_name_is_suggested(bodies):
+    turned = {"A": jf.FreeBody(np.ones((FREQ.size, 2, 2)), ["3:y", "3:theta_z"])}
+    with pytest.raises(ValueError, match="no body has a DOF 'A/3:theta'; did you mean A/3:theta_z"):
+        jf.couple_bodies(FREQ, turned, [jf.BodyLink(jf.Joint([1.0]), ["A/3:theta"])])
+    with pytest.raises(ValueError, match="no DOF '2:theta_z'; did you mean 2:theta"):
+        jf.beam(1.0, 2, youngs_modulus=2e11, density=7.8e3, width=0.02, height=0.01).index("2:theta_z")
 
 
 @pytest.mark.parametrize(
@@ -159,7 +221,7 @@ def test_a_constraint_that_is_there_twice_is_singular(bodies):
         ({"links": [jf.BodyLink(jf.Joint([1.0]), ["A/1:x"], ["A/1:x"])]}, "A/1:x is connected with itself"),
         ({"responses": ["A/1:x", "A/1:x"]}, "responses must name each DOF once"),
         ({"bodies": {"A/": jf.FreeBody(np.ones((25, 1, 1)), ["x"])}}, "names without '/'"),
-        ({"links": []}, "links must hold at least one BodyLink"),
+        ({"links": []}, "links must contain at least one BodyLink"),
         ({"freq_hz": [1.0]}, "body A must have 1 lines as freq_hz, not 25"),
     ],
 )

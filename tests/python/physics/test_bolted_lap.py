@@ -105,7 +105,7 @@ def test_bodies_and_interfaces_of_the_mesh():
         ({"bolt": Bolt(nut_radius=0.0125)}, "nut_radius .* must stay within the overlap"),
         ({"ends": ("clamped", "hinged")}, "ends must be one of"),
         ({"preset": "best"}, "preset must be one of"),
-        ({"overlap": 0.0135, "width": 0.2}, "a brick of A near .* is badly shaped"),
+        ({"overlap": 0.0135, "width": 0.2}, "a brick of A near .* has a scaled Jacobian"),
     ],
 )
 def test_impossible_geometry(change, message):

@@ -90,7 +90,9 @@ def test_matrices_that_calculix_stores_give_its_frequencies(tmp_path):
     found = part.structure.model.natural_frequencies(14)
     assert found[6:] == pytest.approx(theirs[6:], rel=1e-6)
     lines = "\n".join(part.describe())
-    assert "model.sti, model.mas (CalculiX, SI); the upper triangle is stored, the other one was filled in" in lines
+    assert (
+        "model.sti, model.mas (CalculiX, SI); the upper triangle is stored, the rest was completed by symmetry" in lines
+    )
     assert f"mass {0.3 * 0.025 * 0.006 * 2700:.4g} kg, centre of gravity" in lines
     assert "6 rigid motions are free" in lines
     assert "warning" not in lines

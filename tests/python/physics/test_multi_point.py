@@ -143,7 +143,7 @@ def test_the_threshold_is_what_noise_can_make():
     rng = np.random.default_rng(4)
     variance = np.full((400, 24, 24), 2.0)
     noise = rng.standard_normal((400, 24, 24)) + 1j * rng.standard_normal((400, 24, 24))
-    with pytest.warns(jf.IdentificationWarning, match="on 400 of 400 lines fewer than the 12"):
+    with pytest.warns(jf.IdentificationWarning, match="400 of 400 lines use .* of the 12"):
         found = multi_point_stiffness(noise, side, side, noise=variance)
     ratio = found.singular_values[:, 0] / found.threshold
     assert np.mean(ratio < 1) > 0.95
@@ -151,7 +151,7 @@ def test_the_threshold_is_what_noise_can_make():
     assert not found.lines[found.rank == 0].any()
     np.testing.assert_allclose(found.threshold, 2 * np.sqrt(24 * 2.0))
     variance[:, 12:, :12] = 5.0
-    with pytest.warns(jf.IdentificationWarning, match="fewer than the 6"):
+    with pytest.warns(jf.IdentificationWarning, match="of the 6 singular"):
         across = multi_point_compliance(noise, side, side, noise=variance)
     np.testing.assert_allclose(across.threshold, 2 * np.sqrt(12 * 2.0))
 
@@ -162,7 +162,7 @@ def test_noise_leaves_the_rigid_motions_and_their_joint():
     k = full_stiffness(freq)
     _, sides, gamma = rigid_patches(freq, k, -0.8 * AROUND)
     measured = jf.pollute(gamma, 0.001, seed=6)
-    with pytest.warns(jf.IdentificationWarning, match="fewer than the 12 singular values"):
+    with pytest.warns(jf.IdentificationWarning, match="of the 12 singular values"):
         stiff = multi_point_stiffness(measured, *sides, noise=0.001)
     good = stiff.rank == 12
     assert (stiff.rank <= 12).all()
@@ -188,10 +188,10 @@ def test_bad_arguments(riveted):
             ((gamma, side, side), {"rank": most + 1}, f"rank must lie between 1 and {most}"),
             ((gamma, side, side), {"rank": 4, "noise": 0.1}, "rank and noise exclude one another"),
             ((gamma, side, side), {"noise": 0.0}, "noise must be positive"),
-            ((gamma, side, side), {"noise": -abs(gamma)}, "noise must not hold negative variances"),
+            ((gamma, side, side), {"noise": -abs(gamma)}, "noise must not contain negative variances"),
             ((gamma, side, side), {"noise": [0.1]}, "noise must have shape"),
         ):
             with pytest.raises(ValueError, match=message):
                 function(*arguments, **more)
-    with pytest.warns(jf.IdentificationWarning, match="on 2 of 2 lines fewer than the 4 singular values"):
+    with pytest.warns(jf.IdentificationWarning, match="2 of 2 lines use .* of the 4 singular values"):
         multi_point_stiffness(gamma, side, side, rank=3)

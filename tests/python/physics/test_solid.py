@@ -237,7 +237,7 @@ END = at_end(MESH, LENGTH)
 @pytest.mark.parametrize(
     ("patches", "clamped", "message"),
     [
-        ({"p": ([0, 0, 0], [])}, [], "patch 'p' has no nodes: the mesh is too coarse there, or the patch lies outside"),
+        ({"p": ([0, 0, 0], [])}, [], "patch 'p' has no nodes; refine the mesh there, or move the patch inside"),
         ({"p": ([0, 0, 0], END[:2])}, [], "patch 'p' needs at least three nodes that are not on one line"),
         ({"p": ([0, 0, 0], at_end(MESH, 0)[:3])}, [], "patch 'p' needs at least three nodes that are not on one line"),
         ({"p": ([0, 0, 0], END), "q": ([0, 0, 1], END)}, [], "patch 'q' overlaps patch 'p' at x, y, z = -10, 0, 100"),

@@ -379,7 +379,7 @@ def changed(element, place, node):
         (
             NODES,
             ELEMENTS[:, [4, 5, 6, 7, 0, 1, 2, 3]],
-            r"element 1 \(centre 0.5, 0.5, 0.5 m\) .* near its node 1: nodes 1 to 4 must",
+            r"element 1 \(centre 0.5, 0.5, 0.5 m\) .* near its node 1; number nodes 1 to 4",
         ),
         (NODES * [1, 1, 0], ELEMENTS, r"element 1 \(centre 0.5, 0.5, 0 m\) is turned inside out or flat"),
         (np.where(NODES == 3, np.nan, NODES), ELEMENTS, r"nodes holds NaN or Inf at index \(12, 2\)"),
@@ -434,7 +434,7 @@ def test_bad_materials_are_refused(arguments, error, message):
         ({"materials": "steel"}, TypeError, "materials must be one Material or a sequence"),
         ({"materials": [7.0]}, TypeError, "materials must be one Material or a sequence"),
         ({"coordinates": CUBE}, ValueError, r"coordinates must have shape \(n, 8, 3\), not \(8, 3\)"),
-        ({"coordinates": np.zeros((0, 8, 3))}, ValueError, "coordinates must hold at least one element"),
+        ({"coordinates": np.zeros((0, 8, 3))}, ValueError, "coordinates must contain at least one element"),
     ],
 )
 def test_bad_arguments_are_refused(arguments, error, message):

@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ import pytest
 import jointfrf as jf
 from calculix_deck import frequency_step, natural_frequencies
 from jointfrf.dofs import rigid_offset
+from jointfrf.io.cards import card_real
+from jointfrf.io.fe.bulk import bulk_number
 
 CCX = shutil.which("ccx")
 DOFS = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
@@ -364,17 +367,17 @@ def test_text_holds_the_joint(joint, program, options, reader, digits):
 @pytest.mark.parametrize(
     ("joint", "program", "options", "message"),
     [
-        (COUPLED, "abaqus", {"connector": True}, "a connector element holds no hysteretic damping: table_hz= gives"),
+        (COUPLED, "abaqus", {"connector": True}, "a connector element has no hysteretic damping; write a table"),
         (DIAGONAL, "nastran", {"connector": True}, "connector elements are for abaqus"),
         (WITHOUT_LOSS, "abaqus", {"connector": True, "full_matrix": True}, "exclude each other"),
         (WITHOUT_LOSS, "abaqus", {"connector": True, "positions": [[0, 0, 0], [1, 0, 0]],
                                   "points": [[0, 0, 0], [0.5, 0, 0]]}, "needs one reference point"),
-        (COUPLED, "nastran", {"table_hz": TABLE_HZ}, "PBUSHT of nastran holds tables of single directions"),
+        (COUPLED, "nastran", {"table_hz": TABLE_HZ}, "PBUSHT of nastran has tables of single directions"),
         (DIAGONAL, "ansys", {"table_hz": TABLE_HZ}, "ansys has no tables over frequency"),
         (DIAGONAL, "calculix", {"table_hz": TABLE_HZ}, "calculix has no tables over frequency"),
         (DIAGONAL, "abaqus", {"table_hz": [0.0, 5.0]}, "at least two frequencies above 0 Hz"),
         (DIAGONAL, "abaqus", {"table_hz": [5.0]}, "at least two frequencies above 0 Hz"),
-        (DIAGONAL, "abaqus", {"table_hz": TABLE_HZ, "full_matrix": True}, "matrices have none"),
+        (DIAGONAL, "abaqus", {"table_hz": TABLE_HZ, "full_matrix": True}, "full_matrix has no tables"),
     ],
 )  # fmt: skip
 def test_what_no_connector_and_no_table_holds(joint, program, options, message):
@@ -426,7 +429,7 @@ def test_a_fit_is_exported_as_its_joint():
         (DIAGONAL, ("nastran", NODES), {"number": 1.5}, "number must be an integer"),
         (COUPLED, ("nastran", NODES), {"number": 1234567}, "at most six digits"),
         (DIAGONAL, ("calculix", NODES), {}, "damping=False"),
-        (DIAGONAL, ("calculix", NODES), {"damping": False}, "rotation_nodes must name the ROT NODEs"),
+        (DIAGONAL, ("calculix", NODES), {"damping": False}, "calculix has rotations at ROT NODEs"),
         (DIAGONAL, ("calculix", NODES), {"full_matrix": True}, "full_matrix is not for calculix"),
         (DIAGONAL, ("abaqus", NODES), {"rotation_nodes": (5, 6)}, "rotation_nodes are for calculix"),
         (DIAGONAL, ("ansys", NODES), {}, "no hysteretic damping"),
@@ -685,7 +688,7 @@ def test_nodes_at_the_joint_need_no_arms():
         ({"positions": [1e3 * AT_J, 1e3 * AT_K]}, r"a node lies 45 m from the reference point of the joint"),
         ({"units": "inch"}, "units must be"),
         ({"faces": [[1, 2, 3]]}, "faces must be two lists of nodes"),
-        ({"faces": [[1, 2], [2, 3]]}, "faces must hold each node once, and not the nodes of the joint, as 2"),
+        ({"faces": [[1, 2], [2, 3]]}, "faces must contain each node once, and not the nodes of the joint, as 2"),
         ({"faces": [[1, 2], [102, 3]]}, "and not the nodes of the joint, as 102"),
         ({"positions": AT_J, "points": AT_J}, "positions must have shape"),
         ({"positions": [AT_J, AT_K], "points": [np.nan, 0, 0]}, "points"),
@@ -822,3 +825,59 @@ def test_pynastran_reads_what_is_written(tmp_path):
             at = PLACE[row[0], row[1]], PLACE[column[0], column[1]]
             whole[at] = whole[at[::-1]] = value
         np.testing.assert_allclose(whole, expected_one, rtol=1e-9)
+
+
+NUMBERS = [1.0, 123456.789012345678, -2.0 / 3.0, 6.02214076e23, -1.0 / 3e7, 1e100 / 7, -1e-100 / 7, 1e-300, -1.5e308]
+
+
+@pytest.mark.parametrize("value", NUMBERS)
+def test_a_number_of_a_card_comes_back(value):
+    for columns, letter, digits in ((20, "E", 12), (19, "E", 12), (16, "", 8)):
+        text = card_real(value, columns, letter)
+        assert len(text) <= columns
+        again = bulk_number(text, Path("own"))
+        assert abs(again - value) <= 10.0**-digits * abs(value)
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan, 5e-324])
+def test_a_number_that_is_none_is_not_written(value):
+    with pytest.raises(ValueError, match="a card cannot contain"):
+        card_real(value)
+
+
+PLACES_APART = {"positions": [[0, 0, 0], [0, 0, 5.0]]}
+
+
+@pytest.mark.parametrize("program", ["abaqus", "calculix", "nastran", "ansys"])
+@pytest.mark.parametrize("options", [{}, {"units": "mm-t-s"}, {"units": "mm-kg-ms"}, PLACES_APART])
+@pytest.mark.parametrize("k", [1e308, 1e305, 6e307, -1e120 / 7, 1e-120 / 7, 1e-300, 5e-324, 7e5])
+def test_every_number_of_a_card_is_finite_and_fits_its_field(program, options, k):
+    """Or the export is an error; all warnings of numpy are errors in the tests."""
+    joint = jf.Joint([k], dofs=["y"])
+    if program == "calculix" and options is PLACES_APART:
+        options = options | {"rotation_nodes": (3, 4)}
+    try:
+        text = joint.export(program, (1, 2), **options)
+    except ValueError as error:
+        assert "a card cannot contain" in str(error) or "is out of range" in str(error)  # noqa: PT017
+        assert k != 7e5
+        return
+    mark = {"nastran": "$", "ansys": "!"}.get(program, "*")
+    lines = [line for line in text.splitlines() if not line.startswith(mark)]
+    words = [word.strip() for line in lines for word in line.split(",")]
+    if program == "nastran":
+        assert all(len(line) <= 72 for line in lines)
+        words = [line[at : at + 16].strip() for line in lines for at in range(8, 72, 16)]
+    assert not [word for word in words if word.strip("-").upper() in ("INF", "NAN", "INFINITY")]
+    assert all(len(word) <= 20 for word in words)
+    metres = {"mm-t-s": 1e3, "mm-kg-ms": 1e6}.get(options.get("units"), 1.0)
+    found = [abs(bulk_number(word, Path("own"))) for word in words if re.fullmatch(r"-?\d\.\d+E?[+-]\d+", word)]
+    assert any(abs(one - abs(k) / metres) <= 1e-8 * abs(k) / metres for one in found)
+
+
+@pytest.mark.parametrize("program", ["abaqus", "calculix", "nastran", "ansys"])
+def test_numbers_that_are_counted_up_have_eight_columns(program):
+    joint = jf.Joint([1e6, 1e6], [0, 0] if program == "calculix" else [5.0, 5.0], dofs=["x", "y"])
+    faces = {"faces": ([11, 12, 13], [21, 22, 23])} if program == "nastran" else {}
+    with pytest.raises(ValueError, match="element must be an integer from 1 to 99999999, not 100000000"):
+        joint.export(program, (1, 2), element=99_999_999, **faces)

@@ -61,7 +61,7 @@ def test_blocks_of_output2(nastran):
     assert found.matrix.shape == (66, 66)
     assert abs(found.matrix - found.matrix.T).max() <= 1e-9 * abs(found.matrix).max()
     with pytest.raises(
-        FileContentError, match=r"holds no matrix mass, but (BHH, KHH|KHH, BHH): name one after the file"
+        FileContentError, match=r"contains no matrix mass, but (BHH, KHH|KHH, BHH); name one after the file"
     ):
         read_matrix(path, "mass")
 
@@ -90,7 +90,7 @@ def test_a_full_file_of_ansys(tmp_path):
     model = part.structure.model
     assert len(model.dofs) == 900
     assert "63 DOFs without any entry are held and left out" in part.structure.about
-    assert "the upper triangle is stored, the other one was filled in" in part.structure.about
+    assert "the upper triangle is stored, the rest was completed by symmetry" in part.structure.about
     # The frequencies that the documentation of the package gives for this file.
     np.testing.assert_allclose(model.natural_frequencies(4), [1283.2004, 1283.2004, 5781.9749, 6919.3989], rtol=1e-6)
     assert "no rigid motion is free" in part.describe()[2]

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy import sparse
 
 import jointfrf as jf
@@ -119,7 +120,7 @@ def test_names_after_the_file_and_several_matrices(tmp_path):
         text = f"DMIG    {name:<8}{0:8d}{6:8d}{2:8d}{0:8d}\nDMIG*   {name:<16}{1:16d}{1:16d}\n*       {1:16d}{1:16d}"
         with (tmp_path / "two.pch").open("a") as file:
             file.write(f"{text}{float(name[1]):16.8E}\n")
-    with pytest.raises(FileContentError, match=r"several that may be the stiffness, but K1, K2: name one"):
+    with pytest.raises(FileContentError, match=r"several that may be the stiffness, but K1, K2; name one"):
         read_matrix(tmp_path / "two.pch", "stiffness")
     assert read_matrix(tmp_path / "two.pch#K2", "stiffness").matrix.toarray().tolist() == [[2.0]]
 
@@ -127,12 +128,51 @@ def test_names_after_the_file_and_several_matrices(tmp_path):
 def test_a_triangle_is_completed_where_the_format_says_so_only(tmp_path):
     (tmp_path / "k.sti").write_text("1 1 2.0\n1 2 -1.0\n2 2 3.0\n")
     found = read_matrix(tmp_path / "k.sti", "stiffness")
-    assert (found.matrix.toarray().tolist(), found.completed) == ([[2, -1], [-1, 3]], "upper")
+    assert (found.matrix.toarray().tolist(), found.completed) == ([[2, -1], [-1, 3]], "the upper triangle")
     (tmp_path / "k.sti").write_text("1 1 2.0\n1 2 -1.0\n2 1 -1.5\n2 2 3.0\n")
     found = read_matrix(tmp_path / "k.sti", "stiffness")
     assert (found.matrix.toarray().tolist(), found.completed) == ([[2, -1], [-1.5, 3]], "")
     np.savez(tmp_path / "k.npz", stiffness=np.array([[2.0, -1], [0, 3]]))
     assert read_matrix(tmp_path / "k.npz", "stiffness").matrix.toarray().tolist() == [[2, -1], [0, 3]]
+
+
+def _dmig(form, entries):
+    """A DMIG matrix of node 1 to 9, DOF 1, of entries (row, column, value)."""
+    lines = [f"DMIG,KAAX,0,{form},2,0,,,9", *(f"DMIG,KAAX,{j},1,,{i},1,{x}" for i, j, x in entries)]
+    return "\n".join([*lines, ""])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_off_diagonal_terms_once_in_any_mixture_of_triangles(tmp_path, seed):
+    rng = np.random.default_rng(seed)
+    whole = rng.standard_normal((6, 6)).round(6)
+    whole = whole + whole.T
+    entries = []
+    for i in range(6):
+        for j in range(i + 1):
+            at = (i, j) if rng.uniform() < 0.5 else (j, i)
+            entries += [(at[0] + 1, at[1] + 1, whole[i, j])]
+            if i != j and seed == 3 and rng.uniform() < 0.5:  # some on both sides, which form 6 allows
+                entries += [(at[1] + 1, at[0] + 1, whole[i, j])]
+    (tmp_path / "k.pch").write_text(_dmig(6, sorted(entries, key=lambda one: one[1])))
+    found = read_matrix(tmp_path / "k.pch", "stiffness")
+    assert_allclose(found.matrix.toarray(), whole)
+    assert found.completed == "each off-diagonal term once"
+    (tmp_path / "k.pch").write_text(_dmig(1, entries))
+    assert not np.allclose(read_matrix(tmp_path / "k.pch", "stiffness").matrix.toarray(), whole)
+    if seed < 3:
+        (tmp_path / "k.mtx").write_text("".join(f"{i},1, {j},1, {x}\n" for i, j, x in entries))
+        assert_allclose(read_matrix(tmp_path / "k.mtx", "stiffness").matrix.toarray(), whole)
+
+
+def test_an_unsymmetric_matrix_stays_one(tmp_path):
+    entries = [(1, 1, 2.0), (1, 2, -1.0), (2, 1, -1.0), (2, 2, 3.0), (3, 3, 1.0), (2, 3, 0.5)]  # (3, 2) is zero
+    (tmp_path / "k.mtx").write_text("".join(f"{i},1, {j},1, {x}\n" for i, j, x in entries))
+    found = read_matrix(tmp_path / "k.mtx", "stiffness").matrix.toarray()
+    assert (found[1, 2], found[2, 1]) == (0.5, 0)
+    (tmp_path / "k.pch").write_text(_dmig(6, [(1, 1, 2.0), (1, 2, -1.0), (2, 1, -1.5), (2, 2, 3.0)]))
+    found = read_matrix(tmp_path / "k.pch", "stiffness").matrix.toarray()
+    assert (found[0, 1], found[1, 0]) == (-1.0, -1.5)  # a part of this matrix is an error
 
 
 # ---------------------------------------------------------------- reference points
@@ -196,7 +236,7 @@ def test_a_node_that_follows_a_rigid_point_is_found_by_its_place(tmp_path, model
     [
         ('set = "NONE"', r"has no set 'NONE'; it has ALL, ENDS, LINE, FIRST"),
         ("nodes = [1, 9999]", "point tip: the place of node 9999 is not known"),
-        ("nodes = [1]", "needs at least three nodes that are not on one line"),
+        ("nodes = [1]", "cannot rotate with its nodes; give three that are not on one line"),
         ("box = [5.0, 5.0, 5.0, 6.0, 6.0, 6.0]", "no node lies in it"),
         ('nodes = [1]\nset = "ENDS"', "exactly one of them names the patch"),
         ("", "exactly one of them names the patch"),
@@ -299,11 +339,16 @@ def test_axes_of_nodes_of_their_own_are_not_taken_for_those_of_the_model(tmp_pat
         ("*NODE\n1, 0, 0, 0\n*NGEN\n1, 5, 1\n", "makes nodes in a way that is not read"),
         ("*NODE, SYSTEM=C\n1, 1, 90, 0\n", "makes nodes in a way that is not read"),
         ("*PART, NAME=A\n*NODE\n1, 0, 0\n*END PART\n*ASSEMBLY\n*INSTANCE, NAME=B, PART=A\n", "write a flat deck"),
-        ("*INCLUDE, INPUT=mesh.inp\n*STEP\n", "it includes MESH.INP: name that file"),
+        ("*INCLUDE, INPUT=mesh.inp\n*STEP\n", "it includes mesh.inp: name that file"),
         ("*NODE\n1, 0, 0, nan\n", "must have a number and finite coordinates"),
-        ("*NODE\n1, 0, 0, 0\n*NSET, NSET=A, GENERATE\n1, 999999999, 1\n", "must count up in steps"),
-        ("GRID,1,7,0.,0.,0.\n", r"those of a local system \(CP\)"),
-        ("1 0 0\n", "must hold node, x, y, z"),
+        ("*NODE\n1, 0, 0, 0\n*NSET, NSET=A, GENERATE\n1, 999999999, 1\n", "states content of"),
+        ("*NODE\n1, 0, 0, 0\n*NSET, NSET=A, GENERATE\n5, 1, 1\n", "must count up in steps"),
+        ("*NODE, NSET=ALL, INPUT=Mesh.txt\n", "takes its nodes from Mesh.txt; name that file instead"),
+        ("*PART, NAME=A\n*NODE\n1, 0, 0\n*END PART\n*PART, NAME=B\n*NODE\n1, 0, 0\n", "parts A and B both have a"),
+        ("*NODE\n1, 0, 0, 0\n1, 5, 0, 0\n", r"node 1 is defined twice, at \(0, 0, 0\) and \(5, 0, 0\)"),
+        ("*NODE\n1, 0, 0, 0\n*TRANSFORM, NSET=A\n0,1,0, -1,0,0\n", "turns the set A, which is not there"),
+        ("GRID,1,7,0.,0.,0.\n", r"in a local system \(CP\)"),
+        ("1 0 0\n", "must contain node, x, y, z"),
     ],
 )
 def test_nodes_that_are_not_read(tmp_path, text, message):
@@ -355,17 +400,17 @@ def test_files_of_nodes_cut_and_changed_anywhere(tmp_path, model, name):
     ("name", "text", "message"),
     [
         ("k.sti", "999999999999 1 1.0\n", "states content of"),
-        ("k.sti", "1 1\n", "a line must hold 3 numbers, not 2"),
+        ("k.sti", "1 1\n", "a line must contain 3 numbers, not 2"),
         ("k.sti", "1.5 1 2.0\n", "numbers of rows and columns must be whole numbers"),
         ("k.sti", "0 1 2.0\n", "names row or column 0 of 1"),
-        ("k.sti", "1 1 nan\n", "holds NaN or Inf in row 1, column 1"),
+        ("k.sti", "1 1 nan\n", "contains NaN or Inf in row 1, column 1"),
         ("k.mtx", "1,1, 1,1001, 2.0\n", "numbers of DOFs must be 0 to 999"),
         ("k.pch", "DMIG,KAAX,1,1,,1,1,2.0\n", "'KAAX' has no card that begins it"),
-        ("k.pch", "DMIG,KAAX,0,2,2,0,,,1\nDMIG,KAAX,1,1,,1,1,2.0\n", "is of form 2, a square matrix is wanted"),
-        ("k.pch", "DMIG,KAAX,0,6,4,0,,,1\nDMIG,KAAX,1,1,,1,1,2.0,3.0\n", "must hold real numbers, not complex"),
+        ("k.pch", "DMIG,KAAX,0,2,2,0,,,1\nDMIG,KAAX,1,1,,1,1,2.0\n", "is of form 2; write a square matrix"),
+        ("k.pch", "DMIG,KAAX,0,6,4,0,,,1\nDMIG,KAAX,1,1,,1,1,2.0,3.0\n", "must contain real numbers, not complex"),
         ("k.pch", "DMIG,KAAX,0,6,2,0,,,1\nDMIG,KAAX,1,1,,1,1,abc\n", "'ABC' is no number|'abc' is no number"),
-        ("k.rsa", "t\n 3 1 1 1 0\nRSA 999999999 999999999 999999999 0\n(1I8) (1I8) (1D25.15)\n", "not hold the 999"),
-        ("k.rsa", "t\n 3 1 1 1 0\nPSA 1 1 1 0\n(1I8) (1I8) (1D25.15)\n", "must hold an assembled real matrix"),
+        ("k.rsa", "t\n 3 1 1 1 0\nRSA 999999999 999999999 999999999 0\n(1I8) (1I8) (1D25.15)\n", "not contain the 999"),
+        ("k.rsa", "t\n 3 1 1 1 0\nPSA 1 1 1 0\n(1I8) (1I8) (1D25.15)\n", "must contain an assembled real matrix"),
         ("k.xyz", "1 1 1\n", "is of an unknown format of matrices; known are NPZ"),
     ],
 )  # fmt: skip

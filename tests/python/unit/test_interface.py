@@ -1,5 +1,7 @@
 """Joint DOFs from points: signs and places of rotations, and what cannot be built."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -71,3 +73,15 @@ def test_directions_may_be_spelt_in_any_way():
     plain, other = (jf.interface([1, 2], [3, 4], dofs, LINE) for dofs in (["y", "theta_x"], ["Fy", "rx"]))
     assert plain.channels == other.channels
     assert np.array_equal(plain.transform, other.transform)
+
+
+@pytest.mark.parametrize(("length", "highest_hz", "warned"), [(2.9, 1e3, False), (3.1, None, True), (2.9, 5e4, True)])
+def test_points_too_far_apart_for_a_joint_are_named(length, highest_hz, warned):
+    places = {1: (0, 0, 0), 2: (0, 0, 0.02), 3: (0, 0, 0), 4: (0, 0, length)}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        jf.interface([1, 2], [3, 4], ["theta_x"], places, highest_hz=highest_hz)
+    assert bool(caught) == warned
+    if warned:
+        assert f"the points of side k are {length:.3g} m apart" in str(caught[0].message)
+        assert caught[0].filename == __file__

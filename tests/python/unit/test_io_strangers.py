@@ -248,8 +248,11 @@ def test_a_chunk_that_unfolds_to_more_than_it_states(tmp_path, h5py):
     ("text", "message"),
     [
         ("coordinate real general\n100000000000 100000000000 1\n1 1 1.0\n", "states content of"),
-        ("coordinate real general\n9 9 10000000000\n1 1 1.0\n", "does not hold the 10000000000 entries that it states"),
-        ("array real general\n100000 100000\n1.0\n", "does not hold the 10000000000 entries that it states"),
+        (
+            "coordinate real general\n9 9 10000000000\n1 1 1.0\n",
+            "does not contain the 10000000000 entries that it states",
+        ),
+        ("array real general\n100000 100000\n1.0\n", "does not contain the 10000000000 entries that it states"),
     ],
 )
 def test_a_matrix_that_states_too_much(tmp_path, text, message):
@@ -273,7 +276,7 @@ def test_matrices_in_npz_files_that_state_too_much(tmp_path):
 def test_a_compressed_matrix_is_unpacked_by_its_owner(tmp_path):
     path = tmp_path / "k.mtx.gz"
     path.write_bytes(b"\x1f\x8b")
-    with pytest.raises(FileContentError, match="is compressed: unpack it"):
+    with pytest.raises(FileContentError, match="is compressed; unpack it"):
         read_matrix(path, "stiffness")
 
 

@@ -209,8 +209,9 @@ def test_coordinates_that_cannot_be_trusted_are_said(write):
     local = nodes_15({1: (1, 2, 3)}, definition=5)
     with pytest.warns(FileContentWarning, match="coordinates of node 1 are local and are left out"):
         assert not read_uff(write(units(1, 1), system_2420(5, turned), local, function())).coordinates
-    with pytest.warns(FileContentWarning, match="directions at node 1 are those of local axes"):
-        read_uff(write(units(1, 1), system_2420(5, turned), nodes_2411({1: (1, 2, 3)}, displacement=5), function()))
+    with pytest.warns(FileContentWarning, match="local directions at node 1 are turned to global ones"):
+        frfs = read_uff(write(units(1, 1), system_2420(5, turned), nodes_2411({1: (1, 2, 3)}, 5), function()))
+    assert str(frfs.responses[0]) == "1:-x"
     with pytest.warns(FileContentWarning, match="cannot be read and are left out"):
         assert not read_uff(write(units(1, 1), dataset(2411, "one two"), function())).coordinates
     aligned = dataset(

@@ -178,12 +178,15 @@ def test_a_node_is_found_by_its_place():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: rectangle([0, 1], [0]), "x must hold at least two grid lines in ascending order"),
-        (lambda: rectangle([0, 2, 1], [0, 1]), "z must hold at least two grid lines in ascending order"),
+        (lambda: rectangle([0, 1], [0]), "x must contain at least two grid lines in ascending order"),
+        (lambda: rectangle([0, 2, 1], [0, 1]), "z must contain at least two grid lines in ascending order"),
         (lambda: rectangle([0, 1], [0, np.nan]), "x holds NaN or Inf"),
-        (lambda: extrude((rectangle([0, 1], [0, 1]), [1, 0])), "heights must hold at least two values in ascending"),
-        (lambda: holed_rectangle((0, 0), (2, 2, 1), (0.4, 0.3), 4), r"radii 400, 300 mm must grow .* 1000 mm from its"),
-        (lambda: holed_rectangle((0, 0), (2, 0.5, 1), (0.4, 0.5), 4), "stay within the nearest edge, 500 mm"),
+        (lambda: extrude((rectangle([0, 1], [0, 1]), [1, 0])), "heights must contain at least two values in ascending"),
+        (
+            lambda: holed_rectangle((0, 0), (2, 2, 1), (0.4, 0.3), 4),
+            r"radii 400, 300 mm must grow .* to less than 1000 mm",
+        ),
+        (lambda: holed_rectangle((0, 0), (2, 0.5, 1), (0.4, 0.5), 4), "to less than 500 mm at the nearest edge"),
         (lambda: holed_rectangle((0, 0), (2, 2, 1), (-0.1, 0.5), 4), "radii -100, 500 mm must grow"),
         (lambda: holed_rectangle((0, 0), (2, 2, 1), (np.nan,), 4), "radii nan mm must grow"),
         (lambda: holed_rectangle((0, 0), (2, 2, 1), (0.3, 0.4), 0), "divisions must be a whole number, at least 1"),

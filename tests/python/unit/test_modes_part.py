@@ -230,16 +230,19 @@ SHAPES = {"frequency": [10.0, 20.0], "damping": 0.01, "phi": np.ones((2, 2)), "m
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"modal_mass": None}, "holds shapes without modal_mass: shapes of an operational analysis have no scale"),
+        ({"modal_mass": None}, "contains shapes without modal_mass, so without a scale"),
         ({"modal_mass": [1.0, 0.0]}, "mode 2 has no modal mass, so that its shape has no scale"),
         ({"modal_mass": [1.0, -1.0]}, "negative modal masses"),
         ({"damping": 1.5}, "damping ratios that are not between 0 and 1"),
         ({"frequency": [10.0, np.nan]}, "numbers that are not finite"),
-        ({"frequency": None}, "must hold poles, or frequencies and damping"),
+        ({"frequency": None}, "must contain poles, or frequencies and damping"),
         ({"frequency": [10.0, 20.0, 30.0]}, "must be DOFs x 3 modes, not 2 x 2"),
         ({"poles": [3 - 10j, -1 + 20j]}, "poles of the upper half plane only"),
-        ({"phi": None}, "must hold residues, or shapes and modal_mass; it holds frequency, damping, modal_mass, dofs"),
-        ({"phi": None, "A": np.ones((2, 2))}, "must hold driving_point"),
+        (
+            {"phi": None},
+            "must contain residues, or shapes and modal_mass; it contains frequency, damping, modal_mass, dofs",
+        ),
+        ({"phi": None, "A": np.ones((2, 2))}, "must contain driving_point"),
         ({"phi": None, "A": np.ones((2, 2)), "driving_point": 2}, "driving_point must be one of its 2 rows"),
         ({"phi": None, "A": np.eye(2), "driving_point": 0}, "mode 2 does not move its driving point"),
         ({"phi": None, "A": np.ones((2, 3, 2))}, "residues must be DOFs x modes, or DOFs x DOFs x modes"),
@@ -264,7 +267,7 @@ def test_arrays_that_are_no_modes(tmp_path, change, message):
 def test_universal_files_without_modes_and_cut_ones(tmp_path):
     channels = [Channel(1, "+y")]
     write_frfs(tmp_path / "modes.uff", FrfSet(FREQ, channels, channels, np.ones((FREQ.size, 1, 1)), "receptance"))
-    with pytest.raises(FileContentError, match="holds no modes: no dataset 55 or 2414 of normal or complex modes"):
+    with pytest.raises(FileContentError, match="contains no modes: no dataset 55 or 2414 of normal or complex modes"):
         part_of(tmp_path, "uff")
     freq, shapes, _ = normal_modes(BEAM)
     facts = {"analysis_type": 2, "modal_m": 1.0, "modal_damp_vis": 0.01, "modal_damp_his": 0.0}

@@ -85,7 +85,7 @@ def realised(**options):
         (lambda: jf.append_virtual_point(np.eye(3)[None], [0], [1.0]), "point must be a VirtualPoint, not list"),
         (lambda: jf.interpolation([(1, 2)], [[0, 0, 0]]), "mesh must be a Mesh, not list"),
         (lambda: jf.Mesh(np.zeros((8, 3)), np.array([[0, 1, 2, 3, 4, 5, 6, 8]])), "elements must name nodes 0 to 7"),
-        (lambda: jf.Mesh(np.zeros((8, 3)), np.zeros((1, 7), int)), "elements must hold eight node numbers each"),
+        (lambda: jf.Mesh(np.zeros((8, 3)), np.zeros((1, 7), int)), "elements must contain eight node numbers each"),
         (lambda: jf.places_of_nodes(None, [1], [2]), "frfs must be a FrfSet, not NoneType"),
         (lambda: jf.assemble(chain(), "b", jf.Joint([1.0]), [0], [0]), "b must be a Model, not str"),
         (lambda: jf.Model(3.0, np.eye(2), ("x", "y")), r"stiffness must be a square matrix, not of shape \(\)"),

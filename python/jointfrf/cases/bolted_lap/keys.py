@@ -19,11 +19,11 @@ from jointfrf.cases.keys import (
     check_noises,
     joints_of,
 )
-from jointfrf.cases.substructures import PRESET
+from jointfrf.cases.substructures import BRICK, PRESET
 from jointfrf.dofs import Parameter
 from jointfrf.frf.bands import Band
 from jointfrf.joint import Joint
-from jointfrf.solids.bolted_lap import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
+from jointfrf.solids.bolted_lap import PROOF_STRENGTH, STRESS_AREA, Bolt, lap_bricks, preload_force
 from jointfrf.solids.brick_beam import Preset
 from jointfrf.toml.declared import Keys, NotNegative, Positive, key
 
@@ -155,6 +155,8 @@ def read_bolted_lap(common: Case, keys: BoltedLapKeys, expected: BoltedLapExpect
     for noise in keys.noise:
         if not set(noise.methods) <= set(_METHODS):
             raise noise.error("methods", f"a list of {', '.join(_METHODS)}")
+    beams = keys.beams
+    beams.table.check_stated("height", BRICK * lap_bricks((*beams.lengths, beams.overlap), beams.height))
     own = keys.bolt
     sizes = (own.shank_radius, own.head_radius, own.head_height, own.nut_radius, own.nut_height)
     strength = STRESS_AREA[own.size], PROOF_STRENGTH[own.strength_class]

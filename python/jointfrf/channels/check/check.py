@@ -182,7 +182,7 @@ def check_frfs(
         _check_signals(state)
         unspoilt = None
         if joint is not None:
-            state.findings.extend(reference_findings(joint))
+            state.findings.extend(reference_findings(joint, float(freq[-1])))
             unspoilt = _check_rigid_motion(state, joint, missing)
         _check_channels(state)
         state.findings.extend(bent_findings(state.corrected(), state.bad_rows, state.bad_columns))

@@ -20,6 +20,7 @@ from jointfrf.channels.check.driving_points import (
 from jointfrf.channels.check.finding import FindingLevel, FrfFinding
 from jointfrf.channels.check.pair_ratios import are_signals
 from jointfrf.channels.check.signals import as_measurement, modulus, smoothness
+from jointfrf.channels.extent import extent_of, longest_extent
 from jointfrf.channels.joint_channels import JointChannels
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
@@ -114,9 +115,9 @@ def _ratio(freq_hz: FloatArray, h: ComplexArray, hidden: np.ndarray, n: int) -> 
     return power, complex(np.median(own), sign), float(1.4826 * np.median(abs(own - np.median(own))))
 
 
-#: Root mean square distance of channels from their middle, m, from which they lie about no joint: coordinates in
-#: another unit. From the first such a unit is tried, where it brings the reference point nearer.
-_LARGE, _WIDEST = 0.5, 5.0
+#: Root mean square distance of channels from their middle, m, from which another unit is tried, where it brings the
+#: reference point nearer.
+_LARGE = 0.5
 #: Distance of the reference point from the middle of the channels, in their reach, at which an error of a rotation
 #: enters translations of the point that many times larger.
 _FAR = 10.0
@@ -139,22 +140,23 @@ class _Place(NamedTuple):
         return float(np.linalg.norm(point_times * self.point - self.middle))
 
 
-def reference_findings(joint: JointChannels) -> Iterator[FrfFinding]:
+def reference_findings(joint: JointChannels, highest_hz: float) -> Iterator[FrfFinding]:
     """Find coordinates and reference points in different units, and points far from all channels."""
-    places = []
+    places, too_wide = [], False
     for side in ("j", "k"):
         every = np.vstack([joint.positions[kind, side] for kind in ("response", "excitation")])
         middle = every.mean(axis=0)
         reach = float(np.sqrt(((every - middle) ** 2).sum(axis=1).mean()))
+        too_wide |= extent_of(every) > longest_extent(highest_hz)
         if reach > 0:
             places.append(_Place(side, middle, reach, joint.points["response", side].point))
     wide = [one for one in places if one.reach >= _LARGE and _unit(one, 1) is not None]
     unit = _unit(wide[0], 1) if wide else None
-    if wide or any(one.reach >= _WIDEST for one in places):
+    if wide or too_wide:
         one = max(places, key=lambda each: each.reach)
         about = f"and the reference point {_in_metres(one.point)} is in metres: " if unit else ""
         yield _found(
-            "error" if unit else "warning", one.reach, _WIDEST,
+            "error" if unit else "warning", one.reach, _LARGE,
             f"the coordinates of the channels look like {unit or 'millimetres'}, {about}they lie {one.reach:.3g} m "
             f"(root mean square) about their middle on side {one.side}",
             "give coordinates of channels, and the reference point, in metres",

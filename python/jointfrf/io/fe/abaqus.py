@@ -26,7 +26,7 @@ def _triplets(path: Path, limit: ReadLimit, columns: int, delimiter: str | None 
     limit.take(8 * columns * (path.stat().st_size // _LEAST_LINE + 1) // 2)
     found = np.loadtxt(path, comments="*", delimiter=delimiter, ndmin=2, encoding="latin-1")
     if found.shape[0] == 0 or found.shape[1] != columns:
-        raise ValueError(f"a line must hold {columns} numbers, not {found.shape[1] if found.size else 0}")
+        raise ValueError(f"a line must contain {columns} numbers, not {found.shape[1] if found.size else 0}")
     places = found[:, :-1]
     if not np.isfinite(places).all() or (places != np.rint(places)).any() or abs(places).max() > 2**53:
         raise ValueError("numbers of rows and columns must be whole numbers")
@@ -37,7 +37,7 @@ def _read_calculix(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
     found = _triplets(path, limit, 3)
     rows, columns = found[:, 0].astype(np.int64) - 1, found[:, 1].astype(np.int64) - 1
     n = int(max(rows.max(), columns.max())) + 1
-    matrix, completed = matrix_of_entries(path, rows, columns, found[:, 2], n, limit, symmetric=True)
+    matrix, completed = matrix_of_entries(path, rows, columns, found[:, 2], n, limit, symmetric="possible")
     return StoredMatrix(matrix, program="CalculiX", completed=completed)
 
 
@@ -80,7 +80,7 @@ def _read_abaqus(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
         return matrix_of_labels(path, found[:, :4].astype(np.int64), found[:, 4], limit, "Abaqus")
     rows, cols = found[:, 0].astype(np.int64) - 1, found[:, 1].astype(np.int64) - 1
     n = int(max(rows.max(), cols.max())) + 1
-    matrix, completed = matrix_of_entries(path, rows, cols, found[:, 2], n, limit, symmetric=True)
+    matrix, completed = matrix_of_entries(path, rows, cols, found[:, 2], n, limit, symmetric="possible")
     return StoredMatrix(matrix, None, "Abaqus", completed)
 
 

@@ -14,7 +14,7 @@ from scipy import sparse
 from jointfrf.errors import FileContentError
 from jointfrf.extras import import_extra
 from jointfrf.files import ReadLimit
-from jointfrf.io.fe.matrix_format import MatrixFormat, StoredMatrix, dof_name, matrix_of_entries
+from jointfrf.io.fe.matrix_format import MatrixFormat, StoredMatrix, Symmetry, dof_name, matrix_of_entries
 
 __all__ = ["ANSYS_FULL", "HARWELL_BOEING"]
 
@@ -25,16 +25,16 @@ _TIMES = 8
 def _read_full(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
     limit.take(_TIMES * path.stat().st_size)
     if name not in ("stiffness", "mass"):
-        raise FileContentError(f"{path}: of a .full file K and M are read, not {name}")
+        raise FileContentError(f"{path}: a .full file contains stiffness and mass, not {name}; name another file")
     reader = import_extra("ansys.mapdl.reader")
     named, k, m = reader.read_binary(str(path)).load_km(as_sparse=True)
     chosen = k if name == "stiffness" else m
     if chosen is None:
-        raise FileContentError(f"{path} holds no {name}")
+        raise FileContentError(f"{path} contains no {name}; name another file")
     entries = sparse.coo_array(chosen)
     matrix, completed = matrix_of_entries(
         path, entries.row.astype(np.int64), entries.col.astype(np.int64), entries.data, chosen.shape[0], limit,
-        symmetric=True,
+        symmetric="possible",
     )  # fmt: skip
     dofs = tuple(dof_name(node, number + 1) for node, number in named.tolist())
     return StoredMatrix(matrix, dofs, "Ansys", completed)
@@ -67,17 +67,17 @@ def _read_hb(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
         cards = _whole_numbers(next(file))
         third = next(file)
         if not _KIND.match(third.encode("latin-1")):
-            raise FileContentError(f"{path} must hold an assembled real matrix (RSA or RUA), not {third[:3]!r}")
+            raise FileContentError(f"{path} must contain an assembled real matrix (RSA or RUA), not {third[:3]!r}")
         rows, columns, entries = _whole_numbers(third[3:])[:3]
         formats = _FORMAT.findall(next(file))
         if len(cards) > 4 and cards[4] > 0:
             next(file)  # of right-hand sides, which stand at the end
         if rows != columns or rows < 1:
-            raise FileContentError(f"{path} must hold a square matrix, not one of shape {(rows, columns)}")
+            raise FileContentError(f"{path} must contain a square matrix, not one of shape {(rows, columns)}")
         if len(formats) < 3:
-            raise ValueError("its fourth line must hold three formats such as (10I8)")
+            raise ValueError("its fourth line must contain three formats such as (10I8)")
         if 2 * (rows + 2 * entries) > path.stat().st_size:
-            raise ValueError(f"it does not hold the {entries} entries that it states")
+            raise ValueError(f"it does not contain the {entries} entries that it states")
         limit.take(100 * (rows + 2 * entries))
         starts, places, values = (
             _numbers(file, count, form) for count, form in zip((rows + 1, entries, entries), formats, strict=False)
@@ -86,9 +86,9 @@ def _read_hb(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
     if begins[0] != 0 or begins[-1] != entries or (np.diff(begins) < 0).any():
         raise ValueError("the beginnings of its columns do not fit the number of its entries")
     of_column = np.repeat(np.arange(columns), np.diff(begins))
-    is_symmetric = third[1] in "Ss"
+    symmetric: Symmetry = "stated" if third[1] in "Ss" else "no"
     matrix, completed = matrix_of_entries(
-        path, places.astype(np.int64) - 1, of_column, values, rows, limit, symmetric=is_symmetric
+        path, places.astype(np.int64) - 1, of_column, values, rows, limit, symmetric=symmetric
     )
     return StoredMatrix(matrix, None, "Ansys", completed)
 
@@ -108,7 +108,7 @@ def _numbers(file: Iterator[str], count: int, form: tuple[str, str]) -> NDArray[
         words += [text[at : at + width] for at in range(0, min(len(text), a_line * width), width)]
     found = np.array([float(word.replace("D", "E").replace("d", "e")) for word in words[:count] if word.strip()])
     if found.size != count:
-        raise ValueError(f"it holds {found.size} of {count} numbers")
+        raise ValueError(f"it contains {found.size} of {count} numbers")
     return found
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,11 @@ from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit
 
 __all__ = [
-    "ENTRY", "ROW", "MatrixFormat", "StoredMatrix", "chosen_name", "dof_name", "matrix_of_entries",
+    "ENTRY", "ROW", "MatrixFormat", "StoredMatrix", "Symmetry", "chosen_name", "dof_name", "matrix_of_entries",
     "matrix_of_labels",
 ]  # fmt: skip
+
+Symmetry = Literal["stated", "possible", "no"]
 
 #: Bytes of memory of an entry with row and column, and of a row, intermediate results included.
 ENTRY, ROW = 48, 32
@@ -42,7 +45,8 @@ class StoredMatrix:
     program : str
         The program that writes such files; empty for formats of no program, whose numbers are in SI units.
     completed : str
-        Which triangle was completed to a symmetric matrix, because the format stores one only; empty where both are.
+        Entries that the file stores of a symmetric matrix, from which the others were completed: ``the upper
+        triangle``, ``the lower triangle``, or ``each off-diagonal term once``; empty if the file stores all.
     dof_suffix : str
         Of the file beside it that names the DOFs; empty where there is none.
     """
@@ -103,9 +107,9 @@ def dof_name(node: int | str, number: int) -> str:
 
 def matrix_of_entries(
     path: Path, rows: NDArray[np.int64], columns: NDArray[np.int64], values: NDArray[np.float64], n: int,
-    limit: ReadLimit, *, symmetric: bool,
+    limit: ReadLimit, *, symmetric: Symmetry,
 ) -> tuple[sparse.csr_array, str]:  # fmt: skip
-    """Return a matrix of its entries, and which triangle was completed.
+    """Return a matrix of its entries, and the entries from which the others were completed.
 
     Parameters
     ----------
@@ -116,8 +120,10 @@ def matrix_of_entries(
     n : int
         Order.
     limit : ReadLimit
-    symmetric : bool
-        The format stores one triangle of a symmetric matrix; where both are there they are taken as they are.
+    symmetric : {"stated", "possible", "no"}
+        "stated": the file states that the matrix is symmetric, and each off-diagonal term that is stored once is
+        completed, in either triangle. "possible": the format stores symmetric matrices so, but does not state it; the
+        matrix is completed if no off-diagonal term is stored on both sides.
 
     Raises
     ------
@@ -129,16 +135,23 @@ def matrix_of_entries(
             bad = int(places.min()) if places.min() < 0 else int(places.max())
             raise FileContentError(f"{path} is damaged: it names row or column {bad + 1} of {n}")
     limit.take(ROW * n + 2 * ENTRY * values.size)
-    below, above = bool((rows > columns).any()), bool((rows < columns).any())
     found = sparse.csr_array(sparse.coo_array((values, (rows, columns)), shape=(n, n)))
-    if not symmetric or below == above:
+    if symmetric == "no":
         return found, ""
-    return sparse.csr_array(found + found.T - sparse.diags_array(found.diagonal())), "upper" if above else "lower"
+    stored = sparse.csr_array(sparse.coo_array((np.ones(rows.size, bool), (rows, columns)), shape=(n, n)))
+    once = sparse.csr_array(stored > stored.T)  # not stored on the other side of the diagonal
+    is_whole = stored.nnz > once.nnz + np.count_nonzero(stored.diagonal())
+    if not once.nnz or (symmetric == "possible" and is_whole):
+        return found, ""
+    sides = [name for name, cut in (("upper", sparse.triu), ("lower", sparse.tril)) if cut(once).nnz]
+    text = f"the {sides[0]} triangle" if len(sides) == 1 else "each off-diagonal term once"
+    return sparse.csr_array(found + found.multiply(once).T), text
 
 
 def matrix_of_labels(
-    path: Path, labels: NDArray[np.int64], values: NDArray[np.float64], limit: ReadLimit, program: str
-) -> StoredMatrix:
+    path: Path, labels: NDArray[np.int64], values: NDArray[np.float64], limit: ReadLimit, program: str,
+    *, symmetric: Symmetry = "possible",
+) -> StoredMatrix:  # fmt: skip
     """Return a matrix whose rows and columns are named by node and DOF.
 
     Parameters
@@ -149,6 +162,8 @@ def matrix_of_labels(
     values : ndarray, shape (m,)
     limit : ReadLimit
     program : str
+    symmetric : {"stated", "possible", "no"}
+        As for `matrix_of_entries`.
     """
     limit.take(4 * labels.nbytes)
     if (labels[:, 1::2] < 0).any() or (labels[:, 1::2] >= _NUMBERS).any():
@@ -156,7 +171,7 @@ def matrix_of_labels(
     codes = labels[:, ::2] * _NUMBERS + labels[:, 1::2]  # one number a DOF, which sorts by node, then by DOF
     named, places = np.unique(codes.T, return_inverse=True)
     rows, columns = places.reshape(2, -1)
-    matrix, completed = matrix_of_entries(path, rows, columns, values, len(named), limit, symmetric=True)
+    matrix, completed = matrix_of_entries(path, rows, columns, values, len(named), limit, symmetric=symmetric)
     dofs = tuple(dof_name(*divmod(code, _NUMBERS)) for code in named.tolist())
     return StoredMatrix(matrix, dofs, program, completed)
 
@@ -193,5 +208,5 @@ def chosen_name(path: Path, wanted: str, held: Sequence[str]) -> str:
         return found[0]
     what = f"no matrix {wanted}" if not found else f"several that may be the {wanted}"
     raise FileContentError(
-        f"{path} holds {what}, but {', '.join(held[:12]) or 'nothing'}: name one after the file, {path.name}#NAME"
+        f"{path} contains {what}, but {', '.join(held[:12]) or 'nothing'}; name one after the file, {path.name}#NAME"
     )

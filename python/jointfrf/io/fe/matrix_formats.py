@@ -86,7 +86,7 @@ def read_matrix(path: Path, name: str, limit_gb: float | None = None) -> StoredM
         found = chosen.read(path, name, limit)
         shape = found.matrix.shape
         if len(shape) != 2 or shape[0] != shape[1] or not shape[0]:
-            raise FileContentError(f"{path} must hold a square matrix, not one of shape {tuple(shape)}")
+            raise FileContentError(f"{path} must contain a square matrix, not one of shape {tuple(shape)}")
         limit.take(ROW * shape[0])
     return replace(found, matrix=_checked(path, found.matrix), dof_suffix=chosen.dof_suffix)
 
@@ -95,7 +95,7 @@ def _checked(path: Path, found: object) -> sparse.csr_array:
     """Return real finite entries of a square matrix."""
     if found.dtype.kind not in "biuf":  # type: ignore[attr-defined]
         what = "complex" if found.dtype.kind == "c" else str(found.dtype)  # type: ignore[attr-defined]
-        raise FileContentError(f"{path} must hold real numbers, not {what} ones")
+        raise FileContentError(f"{path} must contain real numbers, not {what} ones")
     if hasattr(found, "check_format"):
         try:
             found.check_format(full_check=True)
@@ -107,5 +107,5 @@ def _checked(path: Path, found: object) -> sparse.csr_array:
         entries = sparse.coo_array(matrix)
         bad = int(np.argmin(np.isfinite(entries.data)))
         row, column = entries.row[bad] + 1, entries.col[bad] + 1
-        raise FileContentError(f"{path} holds NaN or Inf in row {row}, column {column}, counted from 1")
+        raise FileContentError(f"{path} contains NaN or Inf in row {row}, column {column}, counted from 1")
     return matrix

@@ -12,7 +12,16 @@ from jointfrf.errors import FileContentError
 from jointfrf.extras import import_extra
 from jointfrf.files import ReadLimit
 from jointfrf.io.fe.bulk import bulk_cards, bulk_number, is_bulk
-from jointfrf.io.fe.matrix_format import ENTRY, ROW, MatrixFormat, StoredMatrix, chosen_name, matrix_of_labels
+from jointfrf.io.fe.matrix_format import (
+    ENTRY,
+    ROW,
+    MatrixFormat,
+    StoredMatrix,
+    Symmetry,
+    chosen_name,
+    matrix_of_entries,
+    matrix_of_labels,
+)
 
 __all__ = ["NASTRAN_DMIG", "NASTRAN_OP2", "NASTRAN_OP4"]
 
@@ -42,17 +51,18 @@ def _read_dmig(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
             raise FileContentError(f"{path} cannot be read as DMIG cards: {title!r} has no card that begins it")
         _add_column(found[title], fields, path)
     if not found:
-        raise FileContentError(f"{path} holds no DMIG cards")
+        raise FileContentError(f"{path} contains no DMIG cards")
     title = chosen_name(path, name, list(found))
     own = found[title]
     if own.form not in (_SQUARE, _SYMMETRIC):
-        raise FileContentError(f"{path}: {title} is of form {own.form}, a square matrix is wanted (1 or 6)")
+        raise FileContentError(f"{path}: {title} is of form {own.form}; write a square matrix, form 1 or 6")
     if own.kind > 2:
-        raise FileContentError(f"{path}: {title} must hold real numbers, not complex ones")
+        raise FileContentError(f"{path}: {title} must contain real numbers, not complex ones")
     if not own.values:
         raise FileContentError(f"{path}: {title} has no entries")
     labels = np.array(own.labels, np.int64).reshape(-1, 4)
-    return matrix_of_labels(path, labels, np.array(own.values), limit, "Nastran")
+    symmetric: Symmetry = "stated" if own.form == _SYMMETRIC else "no"
+    return matrix_of_labels(path, labels, np.array(own.values), limit, "Nastran", symmetric=symmetric)
 
 
 def _add_column(own: _Dmig, fields: list[str], path: Path) -> None:
@@ -95,13 +105,11 @@ def _read_op4(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
         raise FileContentError(f"{path}: {chosen} must be a square matrix, not one of shape {(rows, columns)}")
     limit.take(ROW * rows)
     # By entries: an array of the stated size is never made.
-    found = sparse.csr_array(op4.load(str(path), [chosen], into="list", sparse=True)[1][0])
-    is_half = sparse.triu(found, 1).count_nonzero() == 0 or sparse.tril(found, -1).count_nonzero() == 0
-    completed = ""
-    if form == 6 and is_half and found.count_nonzero() > np.count_nonzero(found.diagonal()):
-        completed = "upper" if sparse.tril(found, -1).count_nonzero() == 0 else "lower"
-        found = sparse.csr_array(found + found.T - sparse.diags_array(found.diagonal()))
-    return StoredMatrix(found, None, "Nastran", completed)
+    found = sparse.coo_array(op4.load(str(path), [chosen], into="list", sparse=True)[1][0])
+    symmetric: Symmetry = "stated" if form == _SYMMETRIC else "no"
+    row, column = found.row.astype(np.int64), found.col.astype(np.int64)
+    matrix, completed = matrix_of_entries(path, row, column, found.data, rows, limit, symmetric=symmetric)
+    return StoredMatrix(matrix, None, "Nastran", completed)
 
 
 NASTRAN_OP4 = MatrixFormat(
@@ -129,7 +137,7 @@ def _read_op2(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
         limit.take(_FULL * rows * columns)
         found = file.rdop2mats([chosen])[chosen]
     if found.dtype.kind == "c":
-        raise FileContentError(f"{path}: {chosen} must hold real numbers, not complex ones")
+        raise FileContentError(f"{path}: {chosen} must contain real numbers, not complex ones")
     return StoredMatrix(sparse.csr_array(found), None, "Nastran")
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,8 @@ from jointfrf.files import ReadLimit, check_file, damage_named, head_of, text_of
 from jointfrf.io.fe.bulk import bulk_cards, bulk_number, is_bulk
 from jointfrf.io.fe.matrix_format import dof_name
 from jointfrf.io.file_format import Reading
-from jointfrf.io.uff_file import UniversalFile, node_coordinates
+from jointfrf.io.uff_axes import node_axes, node_coordinates
+from jointfrf.io.uff_file import UniversalFile
 from jointfrf.io.units import StatedUnits
 from jointfrf.kernel.arguments import FloatArray
 
@@ -23,6 +25,8 @@ __all__ = ["NodeFile", "read_dof_names", "read_nodes"]
 
 #: Bytes of memory for a byte of text: lines, words, arrays of three numbers.
 _TIMES = 12
+#: Bytes of memory of a name of a node in a set.
+_NAME = 100
 #: Keywords of decks that make nodes in other ways than by their coordinates.
 _MAKERS = ("NGEN", "NFILL", "NCOPY", "NMAP")
 #: Nodes are read up to this number: eight columns, and more where programs write more.
@@ -50,12 +54,28 @@ class NodeFile:
     turned: tuple[str, ...] = ()
     is_si: bool = False
 
-    def add(self, path: Path, node: str, words: list[str]) -> None:
+    def add(self, path: Path, node: str, words: Sequence[str]) -> None:
         """Keep a node; raises FileContentError."""
-        numbers = [float(word or 0.0) for word in words] + [0.0] * (3 - len(words))
+        numbers = [float(_exponent(word)) if word else 0.0 for word in words] + [0.0] * (3 - len(words))
         if not node.isdecimal() or int(node) > _LARGEST or not np.isfinite(numbers).all():
             raise FileContentError(f"{path}: node {node[:20]} must have a number and finite coordinates")
-        self.coordinates[str(int(node))] = np.array(numbers)
+        before = self.coordinates.setdefault(str(int(node)), np.array(numbers))
+        if not np.array_equal(before, numbers):
+            places = " and ".join(f"({', '.join(f'{x:.6g}' for x in at)})" for at in (before, numbers))
+            raise FileContentError(
+                f"{path}: node {node} is defined twice, at {places}; give the nodes of all parts different numbers"
+            )
+
+    def named(self, dofs: Sequence[str]) -> tuple[str, ...]:
+        """Return names of DOFs; those of nodes with directions of their own are ``local_x``, ..."""
+        own = set(self.turned)
+        parts = (dof.rpartition(":") for dof in dofs)
+        return tuple(f"{node}{mark}{'local_' if node in own else ''}{way}" for node, mark, way in parts)
+
+
+def _exponent(word: str) -> str:
+    """Return a number with the exponent letter of Python: 1.D-1 is 0.1."""
+    return word.replace("D", "E").replace("d", "e")
 
 
 def read_nodes(path: Path, limit_gb: float | None = None) -> NodeFile:
@@ -76,12 +96,13 @@ def read_nodes(path: Path, limit_gb: float | None = None) -> NodeFile:
     """
     check_file(path, limit_gb)
     head = head_of(path, limit_gb)
-    ReadLimit(path, limit_gb).take(_TIMES * path.stat().st_size)
+    limit = ReadLimit(path, limit_gb)
+    limit.take(_TIMES * path.stat().st_size)
     reader = next(read for is_own, read in _READERS if is_own(path, head))
     with damage_named(path, "a file of nodes", IndexError):
-        found = reader(path)
+        found = reader(path, limit)
     if not found.coordinates:
-        raise FileContentError(f"{path} holds no nodes with coordinates")
+        raise FileContentError(f"{path} has no nodes with coordinates")
     return found
 
 
@@ -91,8 +112,8 @@ def read_nodes(path: Path, limit_gb: float | None = None) -> NodeFile:
 def _keyword(line: str) -> tuple[str, dict[str, str]]:
     """Return the keyword of a line and its parameters, capital letters."""
     word, *rest = (part.strip() for part in line[1:].split(","))
-    pairs = (part.partition("=") for part in rest if part)
-    return " ".join(word.upper().split()), {key.strip().upper(): value.strip().upper() for key, _, value in pairs}
+    pairs = [(key.strip().upper(), value.strip()) for key, _, value in (part.partition("=") for part in rest if part)]
+    return " ".join(word.upper().split()), {key: value if key == "INPUT" else value.upper() for key, value in pairs}
 
 
 def _blocks(path: Path) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
@@ -110,112 +131,145 @@ def _blocks(path: Path) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]
     yield word, options, rows
 
 
-def _of_deck(path: Path) -> NodeFile:
-    found = NodeFile()
-    sets: dict[str, list[str]] = {}
-    turned: set[str] = set()
+def _of_deck(path: Path, limit: ReadLimit) -> NodeFile:
+    found, sets, part = NodeFile(), dict[str, dict[str, None]](), ""
+    parts: dict[str, str] = {}
+    turned: list[str | None] = []
     for word, options, rows in _blocks(path):
-        if word in _MAKERS or (word == "NODE" and options.get("SYSTEM", "R") != "R"):
-            raise FileContentError(f"{path}: *{word} makes nodes in a way that is not read: list them by *NODE")
-        if word in ("INSTANCE", "SYSTEM"):
-            raise FileContentError(f"{path}: *{word} moves nodes, which is not read: write a flat deck without it")
+        _check_keyword(path, word, options)
+        part = options.get("NAME", "") if word == "PART" else "" if word == "END PART" else part
         if word == "NODE":
             for row in rows:
                 found.add(path, row[0], row[1:4])
+                if parts.setdefault(row[0], part) != part:
+                    raise FileContentError(
+                        f"{path}: parts {parts[row[0]]} and {part} both have a node {row[0]}; give the nodes of all "
+                        "parts different numbers"
+                    )
             if "NSET" in options:
-                sets.setdefault(options["NSET"], []).extend(row[0] for row in rows)
+                sets.setdefault(options["NSET"], {}).update(dict.fromkeys(str(int(row[0])) for row in rows))
         elif word == "NSET" and options.get("NSET"):
-            sets.setdefault(options["NSET"], []).extend(_members(path, options, rows, sets))
+            members = sets.setdefault(options["NSET"], {})
+            for row in rows:
+                members.update(dict.fromkeys(_members(path, "GENERATE" in options, row, sets, limit)))
         elif word == "TRANSFORM":
-            turned |= set(sets.get(options.get("NSET", ""), found.coordinates))
+            turned.append(options.get("NSET"))
     if not found.coordinates:
         included = [options.get("INPUT", "?") for word, options, _ in _blocks(path) if word == "INCLUDE"]
-        hint = f": it includes {included[0]}: name that file" if included else ""
-        raise FileContentError(f"{path} holds no nodes with coordinates{hint}")
-    found.sets = {name: tuple(dict.fromkeys(nodes)) for name, nodes in sets.items()}
-    found.turned = tuple(sorted(turned, key=int))
+        hint = f"; it includes {included[0]}: name that file" if included else ""
+        raise FileContentError(f"{path} has no nodes with coordinates{hint}")
+    for name in turned:
+        if name is not None and name not in sets:
+            raise FileContentError(f"{path}: *TRANSFORM turns the set {name}, which is not there; write *NSET {name}")
+    own = {node for name in turned for node in (found.coordinates if name is None else sets[name])}
+    found.sets = {name: tuple(nodes) for name, nodes in sets.items()}
+    found.turned = tuple(sorted(own, key=int))
     return found
 
 
-def _members(path: Path, options: dict[str, str], rows: list[list[str]], sets: dict[str, list[str]]) -> Iterator[str]:
-    """Yield the nodes of a set: numbers, ranges, other sets."""
-    for row in rows:
-        if "GENERATE" in options:
-            first, last, *step = (int(word) for word in row if word)
-            stride = step[0] if step else 1
-            if stride < 1 or not 0 <= first <= last or (last - first) // stride > path.stat().st_size:
-                raise FileContentError(f"{path}: *NSET, GENERATE must count up in steps, not {', '.join(row)[:60]}")
-            yield from map(str, range(first, last + 1, stride))
-            continue
-        for word in row:
-            if word.isdecimal():
-                yield str(int(word))
-            elif word:
-                yield from sets.get(word.upper(), ())
+def _check_keyword(path: Path, word: str, options: dict[str, str]) -> None:
+    """Raise an error for nodes that are elsewhere, or made or moved in a way that is not read."""
+    if word == "NODE" and "INPUT" in options:
+        raise FileContentError(f"{path}: *NODE takes its nodes from {options['INPUT']}; name that file instead")
+    if word in _MAKERS or (word == "NODE" and options.get("SYSTEM", "R") != "R"):
+        raise FileContentError(f"{path}: *{word} makes nodes in a way that is not read; list them by *NODE")
+    if word in ("INSTANCE", "SYSTEM"):
+        raise FileContentError(f"{path}: *{word} moves nodes, which is not read; write a flat deck without it")
+
+
+def _members(
+    path: Path, generate: bool, row: list[str], sets: dict[str, dict[str, None]], limit: ReadLimit
+) -> Iterable[str]:
+    """Return the nodes that a line adds to a set: numbers, a range, other sets."""
+    if generate:
+        first, last, *step = (int(word) for word in row if word)
+        stride = step[0] if step else 1
+        if stride < 1 or not 0 <= first <= last:
+            raise FileContentError(f"{path}: *NSET, GENERATE must count up in steps, not {', '.join(row)[:60]}")
+        limit.take(_NAME * ((last - first) // stride + 1))
+        return map(str, range(first, last + 1, stride))
+    found: list[str] = []
+    for word in filter(None, row):
+        own = [str(int(word))] if word.isdecimal() else list(sets.get(word.upper(), ()))
+        limit.take(_NAME * len(own))
+        found += own
+    return found
 
 
 # ---------------------------------------------------------------- the others
 
 
-def _of_bulk(path: Path) -> NodeFile:
+def _of_bulk(path: Path, limit: ReadLimit) -> NodeFile:
     found = NodeFile()
     turned, local = [], []
-    for _, fields in bulk_cards(path, {"GRID"}):
-        number, system, *rest = fields
-        if system not in ("", "0"):
+    cards = list(bulk_cards(path, {"GRID", "GRDSET"}))
+    defaults = next((fields for name, fields in cards if name == "GRDSET"), [""] * 8)
+    for fields in (fields for name, fields in cards if name == "GRID"):
+        number, placed, *rest = fields
+        if (placed or defaults[1]) not in ("", "0"):
             local.append(number)
             continue
         found.add(path, number, [str(bulk_number(word, path)) if word else "0" for word in rest[:3]])
-        if rest[3] not in ("", "0"):
+        if (rest[3] or defaults[5]) not in ("", "0"):
             turned.append(number)
     if local:
         raise FileContentError(
-            f"{path}: the coordinates of {len(local)} GRIDs such as {local[0]} are those of a local system (CP), which "
-            "are not read: write them in the basic system"
+            f"{path}: {len(local)} GRIDs such as {local[0]} have coordinates in a local system (CP); write them in the "
+            "basic system"
         )
-    found.turned = tuple(turned)
+    found.turned = tuple(str(int(number)) for number in turned)
     return found
 
 
-def _of_ansys(path: Path) -> NodeFile:
-    """Read NBLOCK: a format such as (3i9,6e21.13e3), then node, two numbers, x, y, z."""
+#: Fields of a line of NBLOCK, such as (3i9,6e21.13e3) or (1i7,2i9,6e21.13); and the longest line.
+_FORMAT, _LINE = re.compile(r"(\d{0,3})\s*([ie])\s*(\d{1,3})", re.IGNORECASE), 1000
+
+
+def _of_ansys(path: Path, limit: ReadLimit) -> NodeFile:
+    """Read NBLOCK: a format, then lines of node, other whole numbers, x, y, z, and three angles of its own axes."""
     found = NodeFile()
     lines = iter(text_of(path).splitlines())
     for line in lines:
-        if line.upper().startswith("NBLOCK"):
-            form = re.match(r"\(\s*(\d)i(\d+)\s*,\s*\d?e(\d+)", next(lines, ""), re.IGNORECASE)
-            if form is None:
-                raise FileContentError(f"{path}: the format of NBLOCK must be like (3i9,6e21.13e3)")
-            count, whole, real = (int(word) for word in form.groups())
-            start = count * whole
-            for row in lines:
-                node = row[:whole].strip()
-                if not node.isdecimal():
-                    break
-                cuts = [row[start + i * real : start + (i + 1) * real].strip() for i in range(6)]
-                found.add(path, node, cuts[:3])
-                if any(word and float(word) for word in cuts[3:]):
-                    found.turned += (str(int(node)),)
+        if not line.upper().startswith("NBLOCK"):
+            continue
+        form = next(lines, "")
+        fields = [
+            (kind.lower(), int(width)) for count, kind, width in _FORMAT.findall(form) for _ in range(int(count or 1))
+        ]
+        ends = np.cumsum([0, *(width for _, width in fields)]).tolist()
+        reals = [i for i, (kind, _) in enumerate(fields) if kind == "e"]
+        if not fields or fields[0][0] != "i" or len(reals) < 3 or ends[-1] > _LINE:
+            raise FileContentError(
+                f"{path}: {form.strip()[:40]!r} is no format of NBLOCK; write one like (3i9,6e21.13e3)"
+            )
+        for row in lines:
+            words = [row[first:last].strip() for first, last in pairwise(ends)]
+            if not words[0].isdecimal():
+                break
+            found.add(path, words[0], [words[i] for i in reals[:3]])
+            if any(word and float(_exponent(word)) for word in (words[i] for i in reals[3:6])):
+                found.turned += (str(int(words[0])),)
     return found
 
 
-def _of_universal(path: Path) -> NodeFile:
+def _of_universal(path: Path, limit: ReadLimit) -> NodeFile:
     has_units = bool(UniversalFile(path).datasets(164))
     file = UniversalFile(path, Reading(units=StatedUnits(coordinates="" if has_units else "m")))
-    numbers = [int(row.split()[0]) for number in file.datasets(15, 2411) for row in file.records(number) if row.split()
-               and row.split()[0].isdecimal()]  # fmt: skip
-    held = node_coordinates(file, set(numbers))
-    return NodeFile({str(node): place for node, place in held.items()}, is_si=has_units)
+    numbers = {int(row.split()[0]) for number in file.datasets(15, 2411) for row in file.records(number) if row.split()
+               and row.split()[0].isdecimal()}  # fmt: skip
+    places = node_coordinates(file, numbers)
+    turned = tuple(str(node) for node in sorted(node_axes(file, numbers)))
+    return NodeFile({str(node): place for node, place in places.items()}, turned=turned, is_si=has_units)
 
 
-def _of_table(path: Path) -> NodeFile:
+def _of_table(path: Path, limit: ReadLimit) -> NodeFile:
     found = NodeFile()
     for number, line in enumerate(text_of(path).splitlines(), 1):
         words = line.partition("#")[0].replace(",", " ").replace(";", " ").split()
         if not words or (not found.coordinates and not words[0].isdecimal()):
             continue  # a heading
         if len(words) != 4:
-            raise FileContentError(f"{path}: line {number} must hold node, x, y, z, not {line.strip()[:40]!r}")
+            raise FileContentError(f"{path}: line {number} must contain node, x, y, z, not {line.strip()[:40]!r}")
         found.add(path, words[0], words[1:])
     return found
 
@@ -226,7 +280,7 @@ def _begins_deck(head: bytes) -> bool:
 
 
 #: How the content of a file is recognised, and what reads it; a table of text is what is left.
-_READERS: tuple[tuple[Callable[[Path, bytes], bool], Callable[[Path], NodeFile]], ...] = (
+_READERS: tuple[tuple[Callable[[Path, bytes], bool], Callable[[Path, ReadLimit], NodeFile]], ...] = (
     (lambda path, head: path.suffix.lower() == ".inp" or _begins_deck(head), _of_deck),
     (lambda path, head: re.match(rb"\s*-1\s", head) is not None, _of_universal),
     (lambda path, head: path.suffix.lower() == ".cdb" or b"NBLOCK" in head, _of_ansys),
@@ -292,7 +346,7 @@ def read_dof_names(path: Path) -> tuple[str, ...]:
             words[1] = _direction(path, number, words[1])
         names.append(":".join(words))
     if not names:
-        raise FileContentError(f"{path} holds no names of DOFs")
+        raise FileContentError(f"{path} contains no names of DOFs")
     return tuple(names)
 
 
@@ -312,8 +366,8 @@ def _of_extrn(path: Path) -> tuple[str, ...]:
         words = [word for word in fields if word]
         for node, dofs in zip(words[::2], words[1::2], strict=False):
             if not (node.isdecimal() and dofs.isdecimal()):
-                raise FileContentError(f"{path}: an EXTRN card must hold points and DOFs, not {node} {dofs}"[:200])
+                raise FileContentError(f"{path}: an EXTRN card must contain points and DOFs, not {node} {dofs}"[:200])
             names += [dof_name(node, int(digit)) for digit in dofs]
     if not names:
-        raise FileContentError(f"{path} holds no EXTRN card, which names the DOFs of its matrices")
+        raise FileContentError(f"{path} contains no EXTRN card, which names the DOFs of its matrices")
     return tuple(names)

@@ -23,7 +23,7 @@ def _read(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
     chosen = name if name in fields else next(iter(fields)) if len(fields) == 1 else ""
     if not chosen:
         held = ", ".join(fields) or "nothing"
-        raise FileContentError(f"{path} must hold one array, or one called {name!r}; it holds {held}")
+        raise FileContentError(f"{path} must contain one array, or one called {name!r}; it contains {held}")
     return StoredMatrix(fields[chosen])
 
 
