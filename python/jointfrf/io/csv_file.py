@@ -18,7 +18,7 @@ from jointfrf.files import ReadLimit, text_of, write_file
 from jointfrf.frf.frf_set import Channel, FrfSet
 from jointfrf.io.file_format import TIME_DATA, FileFormat, FrfArrays, Reading
 from jointfrf.io.functions import LooseFunction, arrays_of_functions
-from jointfrf.io.labels import channels_of
+from jointfrf.io.labels import ChannelNamer
 from jointfrf.io.named_arrays import fields_of
 from jointfrf.io.units import QUANTITIES, StatedUnits, parse_frequency_unit, parse_level, parse_phase_unit, parse_unit
 
@@ -148,6 +148,7 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
     frequency_unit = _frequency_unit(path, table.heading[0], units)
     columns = [_column(name, where) for name in table.heading[1:]]
     numbers = np.array([_numbers(table, place, cells) for place, cells in table.rows])
+<<<<<<< HEAD
     if not numbers.size or not columns:
         raise FileContentError(f"{path} holds no table of numbers below its heading")
     parts: dict[tuple[Channel, Channel], dict[str, _Column]] = {}
@@ -159,6 +160,18 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
     functions = [
         each for pair in parts.values() for each in _functions(pair, numbers[:, 0], stated, reading, where)
     ]  # fmt: skip
+=======
+    if not numbers.size or len(table.heading) < 2:
+        raise FileContentError(f"{path} holds no table of numbers below a heading")
+    namer = reading.mapping.namer
+    for name, column in zip(table.heading[1:], numbers.T[1:], strict=True):
+        pair, part = _column(name, where, namer)
+        if part in parts.setdefault(pair, {}):
+            raise FileContentError(f"{where} has two columns {name!r}")
+        parts[pair][part] = _unit_of(name), column
+    freq_hz = numbers[:, 0] * _HZ[hz]
+    functions = [each for pair, columns in parts.items() for each in _functions(pair, columns, freq_hz, where)]
+>>>>>>> 5c12b915014ec4ba38cb07dd6457688759ea534e
     found = arrays_of_functions(functions, where, limit)
     found.quantity = found.quantity or table.stated.get("quantity", "")
     found.frequency_unit = frequency_unit
@@ -184,6 +197,7 @@ def _numbers(table: TextTable, place: str, cells: list[str]) -> list[float]:
         raise
 
 
+<<<<<<< HEAD
 def _frequency_unit(path: Path, name: str, units: StatedUnits) -> str:
     """Return the unit of the first column; empty if the user states it.
 
@@ -246,6 +260,10 @@ class _Column(NamedTuple):
 
 def _column(name: str, where: str) -> _Column:
     """Read a heading: all that is left without channels, part and words without a meaning is the unit."""
+=======
+def _column(name: str, where: str, namer: ChannelNamer) -> tuple[tuple[Channel, Channel], str]:
+    """Response, excitation and part that a heading names."""
+>>>>>>> 5c12b915014ec4ba38cb07dd6457688759ea534e
     match = _PAIR.search(name)
     if match is not None:
         before, after = name[: match.start()], name[match.end() :]
@@ -257,7 +275,7 @@ def _column(name: str, where: str) -> _Column:
         if len({part for part, _ in named}) == 1:
             part, place = named[0]
             try:
-                pair = channels_of("heading", [match[1]])[0], channels_of("heading", [match[2]])[0]
+                pair = namer.channel("heading", match[1]), namer.channel("heading", match[2])
             except ValueError as error:
                 raise FileContentError(f"{where} {error}") from error
             rest = f"{rest[: place.start()]} {rest[place.end() :]}"

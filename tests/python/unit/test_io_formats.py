@@ -325,6 +325,18 @@ def test_components_of_labels_are_told_apart(tmp_path):
     np.testing.assert_array_equal(found.h, given.h)
 
 
+def test_components_of_headings_are_told_apart(tmp_path):
+    """Also where one FRF joins them, which would look like that of a driving point."""
+    path = tmp_path / "a.csv"
+    path.write_text("f [Hz],frame:1:x/arm:1:x real [m/N],frame:1:x/arm:1:x imag [m/N]\n1,2,0\n2,3,-1\n")
+    with pytest.raises(
+        FileContentError, match="node 1 in the components 'frame' and 'arm'; number them apart by mapping"
+    ):
+        read_frfs(path)
+    found = read_frfs(path, mapping={"components": "frame:0,arm:100"})
+    assert names((*found.responses, *found.excitations)) == ["1:+x", "101:+x"]
+
+
 def test_a_second_function_between_the_same_channels_is_compared(tmp_path):
     given = frf_set()
     path = write_mat(tmp_path / "a.mat", A=structure_of_testlab(given, label="m/s^2/N"),
