@@ -230,6 +230,8 @@ def _followers(model: PointModel, number: Mapping[str, int], patch: PointPatch) 
         held = [name for name in names[:3] if name not in number]
         if held:
             why = "it is held or belongs to another constraint of the file"
+            if any(f"{node}:local_{direction}" in number for direction in DIRECTIONS[:3]):
+                why = "its directions are local; write the model in global ones"
             raise ValueError(f"point {patch.name}: node {node} has no DOF {held[0]}: {why}")
         dofs += [number[name] for name in names[:3]]
         rows += list(motion[i])

@@ -220,7 +220,7 @@ def test_laws_are_exported_as_tables_that_a_straight_line_between_lines_meets(tm
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["ansys:1,2", "--frequency", "5:500"], "ansys has no tables over frequency; name one frequency by --frequency HZ"),
+        (["ansys:1,2", "--frequency", "5:500"], "no tables over frequency; name one frequency by --frequency HZ"),
         (["abaqus:1,2", "--frequency", "500:5"], "must be a frequency above 0 Hz, or LOW:HIGH, not '500:5'"),
         (["abaqus:1,2"], "depends on frequency; name by --frequency HZ that at which it is taken"),
         (["nastran:1,2", "--frequency", "5", "--connector"], "are for abaqus, not for nastran; leave --connector out"),

@@ -331,6 +331,10 @@ def test_axes_of_nodes_of_their_own_are_not_taken_for_those_of_the_model(tmp_pat
     assert part.has("1:local_x")
     assert not part.has("1:x")
     assert "5 nodes have directions of their own" in part.structure.about
+    with path.open("a") as file:
+        file.write('[[point]]\nname = "end"\nset = "FIRST"\n')
+    with pytest.raises(FileContentError, match="node 1 has no DOF 1:x: its directions are local; write"):
+        jf.read_part(path)
 
 
 @pytest.mark.parametrize(
