@@ -146,9 +146,9 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
     table = read_text_table(path, reading.skip_lines)
     where, units = str(path), reading.units
     frequency_unit = _frequency_unit(path, table.heading[0], units)
-    columns = [_column(name, where) for name in table.heading[1:]]
+    namer = reading.mapping.namer
+    columns = [_column(name, where, namer) for name in table.heading[1:]]
     numbers = np.array([_numbers(table, place, cells) for place, cells in table.rows])
-<<<<<<< HEAD
     if not numbers.size or not columns:
         raise FileContentError(f"{path} holds no table of numbers below its heading")
     parts: dict[tuple[Channel, Channel], dict[str, _Column]] = {}
@@ -160,23 +160,17 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
     functions = [
         each for pair in parts.values() for each in _functions(pair, numbers[:, 0], stated, reading, where)
     ]  # fmt: skip
-=======
-    if not numbers.size or len(table.heading) < 2:
-        raise FileContentError(f"{path} holds no table of numbers below a heading")
-    namer = reading.mapping.namer
-    for name, column in zip(table.heading[1:], numbers.T[1:], strict=True):
-        pair, part = _column(name, where, namer)
-        if part in parts.setdefault(pair, {}):
-            raise FileContentError(f"{where} has two columns {name!r}")
-        parts[pair][part] = _unit_of(name), column
-    freq_hz = numbers[:, 0] * _HZ[hz]
-    functions = [each for pair, columns in parts.items() for each in _functions(pair, columns, freq_hz, where)]
->>>>>>> 5c12b915014ec4ba38cb07dd6457688759ea534e
     found = arrays_of_functions(functions, where, limit)
     found.quantity = found.quantity or table.stated.get("quantity", "")
     found.frequency_unit = frequency_unit
     phases, levels = (any(each.part == part for each in columns) for part in ("phase", "magnitude"))
-    found.takes = ("skip_lines", "frequency", *(["phase"] if phases else []), *(["level"] if levels else []))
+    found.takes = (
+        "skip_lines",
+        "frequency",
+        "components",
+        *(["phase"] if phases else []),
+        *(["level"] if levels else []),
+    )
     if "averages" in table.stated:
         try:
             found.averages = float(table.stated["averages"])
@@ -197,7 +191,6 @@ def _numbers(table: TextTable, place: str, cells: list[str]) -> list[float]:
         raise
 
 
-<<<<<<< HEAD
 def _frequency_unit(path: Path, name: str, units: StatedUnits) -> str:
     """Return the unit of the first column; empty if the user states it.
 
@@ -258,12 +251,8 @@ class _Column(NamedTuple):
         return f"{self.part} of {self.pair[0]} / {self.pair[1]}"
 
 
-def _column(name: str, where: str) -> _Column:
+def _column(name: str, where: str, namer: ChannelNamer) -> _Column:
     """Read a heading: all that is left without channels, part and words without a meaning is the unit."""
-=======
-def _column(name: str, where: str, namer: ChannelNamer) -> tuple[tuple[Channel, Channel], str]:
-    """Response, excitation and part that a heading names."""
->>>>>>> 5c12b915014ec4ba38cb07dd6457688759ea534e
     match = _PAIR.search(name)
     if match is not None:
         before, after = name[: match.start()], name[match.end() :]
