@@ -1,10 +1,12 @@
 !> FRFs that fit a joint: the manifold on which a fit of measured FRFs is linearised.
 !>
-!> Whatever the substructures are, the receptances at the two sides of a joint of compliance C can be written with two
-!> free matrices H and M, symmetric where the structure is reciprocal:
-!>   gamma_jj = H, gamma_jk = H T, gamma_kj = T' H, gamma_kk = T' H T + C T,   T = 1 - M C, T' = 1 - C M.
-!> M is (Y_B + C)^-1 with the receptance Y_B of side k by itself. Nothing is inverted: gamma_jk may be singular, and the
-!> joint rigid.
+!> Whatever the substructures are, the receptances at the two sides of a joint K* can be written with two free matrices
+!> H and Q, symmetric if the structure is reciprocal, and with the compliance R = (K* + Z)^-1 of the joint in parallel
+!> with reference springs Z >= 0, a diagonal matrix:
+!>   gamma_jj = H, gamma_jk = H F, gamma_kj = F' H, gamma_kk = F' H F + R A,
+!>   F = T A, F' = A' T', A = 1 - Q R, A' = 1 - R Q, T = 1 - Z R, T' = 1 - R Z.
+!> Nothing is inverted. With Z > 0 the form is regular for rigid DOFs (R = 0, T = 1) and free DOFs (R = 1/Z, T = 0).
+!> With Z = 0, R is the compliance of the joint and Q = (Y_B + R)^-1 with the receptance Y_B of side k alone.
 !>
 !> Lanes are frequency lines, also with the engine that is LAPACK elsewhere, and for a single line; blocks of lines are
 !> shared among threads.
@@ -32,7 +34,7 @@ module jointfrf_manifold
   end type block_space
 
   !> Square matrices of a line, in the order of their lists.
-  integer, parameter :: at_c = 1, at_h = 2, at_m = 3, at_best_h = 4, at_best_m = 5
+  integer, parameter :: at_r = 1, at_h = 2, at_q = 3, at_best_h = 4, at_best_q = 5
 
   !> Lines as work to be shared: an item is a block of them.
   type, abstract, extends(shared_work) :: manifold_work
@@ -44,7 +46,7 @@ module jointfrf_manifold
     integer, allocatable :: of_targets(:)                  !< all entries of gamma
     integer, allocatable :: weight(:)                      !< where the caller has the weight of each entry
     real(dp), pointer, contiguous :: gamma(:, :, :, :) => null()         !< pairs, numbers, lines, targets
-    real(dp), pointer, contiguous :: c(:, :, :) => null(), h(:, :, :) => null(), m(:, :, :) => null()
+    real(dp), pointer, contiguous :: r(:, :, :) => null(), h(:, :, :) => null(), q(:, :, :) => null()
     real(dp), pointer, contiguous :: inverse_std(:, :) => null(), whitening(:, :, :) => null()
     integer(ip), pointer, contiguous :: line_info(:) => null()
     type(block_space), pointer, contiguous :: space(:) => null()
@@ -56,7 +58,7 @@ module jointfrf_manifold
   type, extends(manifold_work) :: projection
     integer :: steps = 0
     real(dp) :: least_gain = 0.0_dp
-    complex(dp), pointer, contiguous :: free_h(:, :, :) => null(), free_m(:, :, :) => null()
+    complex(dp), pointer, contiguous :: free_h(:, :, :) => null(), free_q(:, :, :) => null()
     real(dp), pointer, contiguous :: squares(:) => null()
   contains
     procedure :: do_block => project_block
@@ -73,8 +75,8 @@ module jointfrf_manifold
 
   type, extends(manifold_work) :: expectation
     real(dp) :: share = 0.0_dp
-    integer, allocatable :: free(:)                        !< where the caller has each free entry of M
-    complex(dp), pointer, contiguous :: free_h(:, :, :) => null(), free_m(:, :, :) => null()
+    integer, allocatable :: free(:)                        !< where the caller has each free entry of Q
+    complex(dp), pointer, contiguous :: free_h(:, :, :) => null(), free_q(:, :, :) => null()
     real(dp), pointer, contiguous :: spread_m(:, :) => null()
   contains
     procedure :: do_block => expect_block
@@ -93,24 +95,27 @@ module jointfrf_manifold
 
 contains
 
-  !> The FRFs nearest to given ones that fit a joint, by Levenberg-Marquardt steps for H and M on every line.
+  !> The FRFs nearest to given ones that fit a joint, by Levenberg-Marquardt steps for H and Q on every line.
+  !> spring       Z, shape (n), N/m
+  !> spring       Z, shape (n), N/m
   !> gamma        FRFs at DOFs j, then k, shape (2 n, 2 n, n_freq), m/N
   !> inverse_std  weights of their entries, same shape, N/m; 0 where an entry is not used
   !> whitening    lower triangular factor that is applied to the weighted entries, shape (q, q, n_freq); of size 0 where
   !>              there is none. Entries are counted row by row, of a reciprocal structure from the diagonal on.
-  !> c_joint      C, shape (n, n, n_freq), m/N
-  !> h, m         H, m/N, and M, N/m, shape (n, n, n_freq): where to begin, and what was found
+  !> r            R, shape (n, n, n_freq), m/N
+  !> h, q         H, m/N, and Q, N/m, shape (n, n, n_freq): where to begin, and the result
   !> squares      weighted squares of the distance, shape (n_freq)
   !> steps        at most
   !> least_gain   a line has arrived when a step lowers its squares by no more
-  subroutine project_on_joint(transposed, reciprocal, steps, least_gain, gamma, inverse_std, whitening, c_joint, h, m, &
-                              squares, line_info, info)
+  subroutine project_on_joint(transposed, reciprocal, steps, least_gain, spring, gamma, inverse_std, whitening, r, h, &
+                              q, squares, line_info, info)
     logical, intent(in) :: transposed, reciprocal
     integer(ip), intent(in) :: steps
     real(dp), intent(in) :: least_gain
-    complex(dp), contiguous, target, intent(in) :: gamma(:, :, :), c_joint(:, :, :)
+    complex(dp), contiguous, target, intent(in) :: gamma(:, :, :), r(:, :, :)
+    real(dp), intent(in) :: spring(:)
     real(dp), contiguous, target, intent(in) :: inverse_std(:, :, :), whitening(:, :, :)
-    complex(dp), contiguous, target, intent(inout) :: h(:, :, :), m(:, :, :)
+    complex(dp), contiguous, target, intent(inout) :: h(:, :, :), q(:, :, :)
     real(dp), contiguous, target, intent(out) :: squares(:)
     integer(ip), contiguous, target, intent(out) :: line_info(:)
     integer(ip), intent(out) :: info
@@ -121,37 +126,38 @@ contains
     work%steps = int(steps)
     work%least_gain = least_gain
     work%free_h => h
-    work%free_m => m
+    work%free_q => q
     work%squares => squares
     one_target(1:size(gamma, 1), 1:size(gamma, 2), 1:size(gamma, 3), 1:1) => gamma
-    call make_manifold_plan(reciprocal, size(c_joint, 1), .false., 1, size(whitening) > 0, work%plan, stat)
-    if (stat == 0) call set_data(work, transposed, one_target, inverse_std, whitening, c_joint, h, m, line_info, stat)
+    call make_manifold_plan(reciprocal, spring, .false., 1, size(whitening) > 0, work%plan, stat)
+    if (stat == 0) call set_data(work, transposed, one_target, inverse_std, whitening, r, h, q, line_info, stat)
     call run(work, 30.0_dp*steps, stat, info)
   end subroutine project_on_joint
 
-  !> The expected FRFs about ones that fit a joint, where entries of M are normal about 0 with deviations known before,
-  !> and the error of the FRFs is `share_of_noise` times their noise: least squares of both by one Gauss-Newton step.
+  !> The expected FRFs near ones that fit a joint, if entries of M = (Y_B + K*^-1)^-1 = Z T' + T Q T' are normal about
+  !> 0 with given deviations, and the error of the FRFs is `share_of_noise` times their noise: least squares of both by
+  !> one Gauss-Newton step. Off-diagonal entries of T are not in the prior.
   !> spread_m     standard deviations of the entries of M, shape (n, n, n_freq), > 0, N/m
-  !> inverse_std, whitening, c_joint, h, m    as in `project_on_joint`
-  subroutine expect_on_joint(transposed, reciprocal, share_of_noise, spread_m, inverse_std, whitening, c_joint, h, m, &
-                             line_info, info)
+  !> spring, inverse_std, whitening, r, h, q    as in `project_on_joint`
+  subroutine expect_on_joint(transposed, reciprocal, share_of_noise, spread_m, spring, inverse_std, whitening, r, h, &
+                             q, line_info, info)
     logical, intent(in) :: transposed, reciprocal
-    real(dp), intent(in) :: share_of_noise
+    real(dp), intent(in) :: share_of_noise, spring(:)
     real(dp), contiguous, target, intent(in) :: spread_m(:, :, :), inverse_std(:, :, :), whitening(:, :, :)
-    complex(dp), contiguous, target, intent(in) :: c_joint(:, :, :)
-    complex(dp), contiguous, target, intent(inout) :: h(:, :, :), m(:, :, :)
+    complex(dp), contiguous, target, intent(in) :: r(:, :, :)
+    complex(dp), contiguous, target, intent(inout) :: h(:, :, :), q(:, :, :)
     integer(ip), contiguous, target, intent(out) :: line_info(:)
     integer(ip), intent(out) :: info
     type(expectation) :: work
-    complex(dp), target :: no_target(2*size(c_joint, 1), 2*size(c_joint, 1), size(line_info), 0)
+    complex(dp), target :: no_target(2*size(r, 1), 2*size(r, 1), size(line_info), 0)
     integer :: stat, k
 
     work%share = share_of_noise
     work%free_h => h
-    work%free_m => m
-    work%spread_m(1:size(c_joint, 1)**2, 1:size(line_info)) => spread_m
-    call make_manifold_plan(reciprocal, size(c_joint, 1), .false., 1, size(whitening) > 0, work%plan, stat)
-    if (stat == 0) call set_data(work, transposed, no_target, inverse_std, whitening, c_joint, h, m, line_info, stat)
+    work%free_q => q
+    work%spread_m(1:size(r, 1)**2, 1:size(line_info)) => spread_m
+    call make_manifold_plan(reciprocal, spring, .false., 1, size(whitening) > 0, work%plan, stat)
+    if (stat == 0) call set_data(work, transposed, no_target, inverse_std, whitening, r, h, q, line_info, stat)
     if (stat == 0) allocate (work%free(work%plan%n_free), stat=stat)
     if (stat == 0) then
       do k = 1, work%plan%n_free
@@ -163,18 +169,19 @@ contains
     call run(work, 30.0_dp, stat, info)
   end subroutine expect_on_joint
 
-  !> Information that FRFs give on a joint about a point of the manifold, H and M eliminated: with d the change of the
-  !> free entries of C, the least squares over H and M are, to second order, s - 2 Re(d^H p) + d^H W d.
+  !> Information that FRFs give on a joint about a point of the manifold, H and Q eliminated: with d the change of the
+  !> free entries of R, the least squares over H and Q are, to second order, s - 2 Re(d^H p) + d^H W d.
   !> gamma        FRFs at DOFs j, then k, shape (2 n, 2 n, n_freq, n_target), m/N
-  !> inverse_std, whitening, c_joint    as in `project_on_joint`, the same for all targets
-  !> h, m         the point, shape (n, n, n_freq)
-  !> information  W, shape (u, u, n_freq); free entries of C are the upper triangle row by row, or all
+  !> spring, inverse_std, whitening, r    as in `project_on_joint`, the same for all targets
+  !> h, q         the point, shape (n, n, n_freq)
+  !> information  W, shape (u, u, n_freq); free entries of R are the upper triangle row by row, or all
   !> gradient     p, shape (u, n_freq, n_target)
   !> squares      s, shape (n_freq, n_target)
-  subroutine joint_forms(transposed, reciprocal, gamma, inverse_std, whitening, c_joint, h, m, information, gradient, &
-                         squares, line_info, info)
+  subroutine joint_forms(transposed, reciprocal, spring, gamma, inverse_std, whitening, r, h, q, information, &
+                         gradient, squares, line_info, info)
     logical, intent(in) :: transposed, reciprocal
-    complex(dp), contiguous, target, intent(in) :: gamma(:, :, :, :), c_joint(:, :, :), h(:, :, :), m(:, :, :)
+    real(dp), intent(in) :: spring(:)
+    complex(dp), contiguous, target, intent(in) :: gamma(:, :, :, :), r(:, :, :), h(:, :, :), q(:, :, :)
     real(dp), contiguous, target, intent(in) :: inverse_std(:, :, :), whitening(:, :, :)
     complex(dp), contiguous, target, intent(out) :: information(:, :, :), gradient(:, :, :)
     real(dp), contiguous, target, intent(out) :: squares(:, :)
@@ -183,8 +190,8 @@ contains
     type(form_finding) :: work
     integer :: stat, i, t
 
-    call make_manifold_plan(reciprocal, size(c_joint, 1), .true., size(gamma, 4), size(whitening) > 0, work%plan, stat)
-    if (stat == 0) call set_data(work, transposed, gamma, inverse_std, whitening, c_joint, h, m, line_info, stat)
+    call make_manifold_plan(reciprocal, spring, .true., size(gamma, 4), size(whitening) > 0, work%plan, stat)
+    if (stat == 0) call set_data(work, transposed, gamma, inverse_std, whitening, r, h, q, line_info, stat)
     associate (plan => work%plan)
       if (stat == 0) allocate (work%result(plan%n_free**2), work%gradient_place(plan%n_free, plan%n_target), stat=stat)
       if (stat == 0) then
@@ -218,10 +225,10 @@ contains
     end do
   end subroutine list_square
 
-  subroutine set_data(work, transposed, gamma, inverse_std, whitening, c_joint, h, m, line_info, stat)
+  subroutine set_data(work, transposed, gamma, inverse_std, whitening, r, h, q, line_info, stat)
     class(manifold_work), intent(inout) :: work
     logical, intent(in) :: transposed
-    complex(dp), contiguous, target, intent(in) :: gamma(:, :, :, :), c_joint(:, :, :), h(:, :, :), m(:, :, :)
+    complex(dp), contiguous, target, intent(in) :: gamma(:, :, :, :), r(:, :, :), h(:, :, :), q(:, :, :)
     real(dp), contiguous, target, intent(in) :: inverse_std(:, :, :), whitening(:, :, :)
     integer(ip), contiguous, target, intent(inout) :: line_info(:)
     integer, intent(out) :: stat
@@ -244,16 +251,16 @@ contains
     do e = 1, size(work%of_targets)
       work%of_targets(e) = work%plan%target + e
     end do
-    call list_square(transposed, n, work%plan%c, work%square(:, at_c))
+    call list_square(transposed, n, work%plan%r, work%square(:, at_r))
     call list_square(transposed, n, work%plan%h, work%square(:, at_h))
-    call list_square(transposed, n, work%plan%m, work%square(:, at_m))
+    call list_square(transposed, n, work%plan%q, work%square(:, at_q))
     call list_square(transposed, n, work%plan%best_h, work%square(:, at_best_h))
-    call list_square(transposed, n, work%plan%best_m, work%square(:, at_best_m))
+    call list_square(transposed, n, work%plan%best_q, work%square(:, at_best_q))
     work%n_target = size(gamma, 4)
     if (work%n_target > 0) call c_f_pointer(c_loc(gamma), work%gamma, [2, 4*n*n, size(gamma, 3), size(gamma, 4)])
-    work%c => real_lines(c_joint)
+    work%r => real_lines(r)
     work%h => real_lines(h)
-    work%m => real_lines(m)
+    work%q => real_lines(q)
     work%inverse_std(1:4*n*n, 1:size(inverse_std, 3)) => inverse_std
     work%whitening => whitening
     work%line_info => line_info
@@ -368,9 +375,9 @@ contains
       end do
       total = total + sum(abs(space%whitening), dim=2)
     end if
-    call load_square(self%c, self%square(:, at_c))
+    call load_square(self%r, self%square(:, at_r))
     call load_square(self%h, self%square(:, at_h))
-    call load_square(self%m, self%square(:, at_m))
+    call load_square(self%q, self%square(:, at_q))
     do t = 1, self%n_target
       call self%kernels%load(4*n2, self%target(:, t), first, n_lines, self%gamma(:, :, :, t), space%x)
       associate (data => space%x(:, :, self%plan%target + (t - 1)*q + 1:self%plan%target + t*q))
@@ -408,10 +415,10 @@ contains
     n2 = self%plan%n**2
     associate (plan => self%plan, x => space%x)
       x(:, :, plan%best_h + 1:plan%best_h + n2) = x(:, :, plan%h + 1:plan%h + n2)
-      x(:, :, plan%best_m + 1:plan%best_m + n2) = x(:, :, plan%m + 1:plan%m + n2)
+      x(:, :, plan%best_q + 1:plan%best_q + n2) = x(:, :, plan%q + 1:plan%q + n2)
       call self%kernels%project(plan, self%steps, self%least_gain, space%w, space%whitening, x, space%squares(:, 1))
       call self%kernels%store(n2, self%square(:, at_best_h), first, n_lines, x, self%h)
-      call self%kernels%store(n2, self%square(:, at_best_m), first, n_lines, x, self%m)
+      call self%kernels%store(n2, self%square(:, at_best_q), first, n_lines, x, self%q)
     end associate
     do l = 1, n_lines
       line = first + l - 1
@@ -419,7 +426,7 @@ contains
       if (.not. space%squares(l, 1) <= huge(1.0_dp)) call overflow(self%line_info(line))
       if (self%line_info(line) == line_good) cycle
       call store_nan(self%free_h(:, :, line))
-      call store_nan(self%free_m(:, :, line))
+      call store_nan(self%free_q(:, :, line))
       self%squares(line) = ieee_value(1.0_dp, ieee_quiet_nan)
     end do
   end subroutine project_block
@@ -428,13 +435,13 @@ contains
     class(expectation), intent(in) :: self
     integer, intent(in) :: first, n_lines
     type(block_space), intent(inout) :: space
-    real(dp) :: of_h(lanes), of_m(lanes)
+    real(dp) :: of_h(lanes), of_q(lanes)
     integer :: n2, k, l, line
 
     n2 = self%plan%n**2
     associate (plan => self%plan, x => space%x)
       x(:, :, plan%best_h + 1:plan%best_h + n2) = x(:, :, plan%h + 1:plan%h + n2)
-      x(:, :, plan%best_m + 1:plan%best_m + n2) = x(:, :, plan%m + 1:plan%m + n2)
+      x(:, :, plan%best_q + 1:plan%best_q + n2) = x(:, :, plan%q + 1:plan%q + n2)
       do k = 1, plan%n_free
         do l = 1, lanes
           x(l, 1, plan%target + k) = self%spread_m(self%free(k), first + min(l, n_lines) - 1)
@@ -442,16 +449,16 @@ contains
       end do
       call self%kernels%expect(plan, self%share, space%w, space%whitening, x)
       call self%kernels%total(n2, self%square(:, at_h), x, of_h)
-      call self%kernels%total(n2, self%square(:, at_m), x, of_m)
+      call self%kernels%total(n2, self%square(:, at_q), x, of_q)
       call self%kernels%store(n2, self%square(:, at_h), first, n_lines, x, self%h)
-      call self%kernels%store(n2, self%square(:, at_m), first, n_lines, x, self%m)
+      call self%kernels%store(n2, self%square(:, at_q), first, n_lines, x, self%q)
     end associate
     do l = 1, n_lines
       line = first + l - 1
-      if (.not. of_h(l) + of_m(l) <= huge(1.0_dp)) call overflow(self%line_info(line))
+      if (.not. of_h(l) + of_q(l) <= huge(1.0_dp)) call overflow(self%line_info(line))
       if (self%line_info(line) == line_good) cycle
       call store_nan(self%free_h(:, :, line))
-      call store_nan(self%free_m(:, :, line))
+      call store_nan(self%free_q(:, :, line))
     end do
   end subroutine expect_block
 

@@ -1,13 +1,16 @@
 !> Where the numbers lie with which FRFs of a joint are written, for the manifold kernels.
 !>
-!> gamma_jj = H, gamma_jk = H T, gamma_kj = T' H, gamma_kk = T' H T + C T with T = 1 - M C, T' = 1 - C M; C is the joint
-!> compliance, H and M are free. Entries of gamma that are used are counted jk row by row, kj column by column, kk and
-!> jj row by row: of a reciprocal structure without kj and what is below the diagonals. Free entries of H, M and C are
-!> the upper triangle row by row, or all.
+!> gamma_jj = H, gamma_jk = H F, gamma_kj = F' H, gamma_kk = F' H F + R A with F = T A, F' = A' T', A = 1 - Q R,
+!> A' = 1 - R Q, T = 1 - Z R, T' = 1 - R Z. R = (K* + Z)^-1 is the compliance of the joint in parallel with reference
+!> springs Z, which are given; H and Q are free. Without springs Z = 0, T = 1, and R is the compliance of the joint.
+!> Entries of gamma that are used are counted jk row by row, kj column by column, kk and jj row by row: of a reciprocal
+!> structure without kj and what is below the diagonals. Free entries of H, Q and R are the upper triangle row by row,
+!> or all.
 !>
 !> A column of derivatives has an element for each entry of gamma. Many of its elements are zero; `groups` are the runs
 !> of entries that have the same columns not zero, so that products of columns leave the zeros out.
 module jointfrf_manifold_plan
+  use jointfrf_kinds, only: dp
   implicit none
   private
   public :: make_manifold_plan
@@ -21,19 +24,26 @@ module jointfrf_manifold_plan
   type, public :: manifold_plan
     logical :: reciprocal = .true.
     integer :: n = 0                       !< joint DOFs
-    integer :: n_free = 0                  !< free entries of H, of M and of C
+    integer :: n_free = 0                  !< free entries of H, of Q and of R
     integer :: n_entry = 0                 !< entries of gamma
-    integer :: n_column = 0                !< columns: by H, by M, then by C where asked for, then residuals
+    integer :: n_column = 0                !< columns: by H, by Q, then by R where asked for, then residuals
     integer :: n_target = 1                !< residuals
     logical :: correlated = .false.        !< whether columns are whitened by a triangular factor
     integer :: n_element = 0               !< elements that all this takes
+    real(dp), allocatable :: spring(:)     !< Z, N/m
+    logical :: has_springs = .false.       !< whether one of them is not zero
     !> The element before each matrix, which lies row by row.
-    integer :: c = 0, h = 0, m = 0         !< at the point that is looked at
-    integer :: best_h = 0, best_m = 0      !< at the best point so far
-    integer :: right = 0, left = 0         !< T and T'
+    integer :: r = 0, h = 0, q = 0         !< at the point that is looked at
+    integer :: best_h = 0, best_q = 0      !< at the best point so far
+    integer :: right = 0, left = 0         !< F and F'
     integer :: jk = 0, kj = 0, kk = 0      !< blocks of gamma
-    integer :: kj_c = 0, jk_c = 0          !< gamma_kj + C and gamma_jk + C
-    integer :: of_c(4) = 0                 !< what columns by C are made of
+    !> Products with T and T'; without springs these are the factors themselves.
+    integer :: t = 0, t_left = 0           !< T and T'; without springs none
+    integer :: a = 0, a_left = 0           !< A and A'
+    integer :: h_t = 0, t_h = 0            !< H T and T' H
+    integer :: kj_t = 0, t_jk = 0          !< gamma_kj T and T' gamma_jk
+    integer :: kj_r = 0, jk_r = 0          !< the same, plus R
+    integer :: of_r(4) = 0                 !< what columns by R are made of
     integer :: target = 0                  !< entries of the FRFs, one run of entries a target
     integer :: columns = 0                 !< columns, one run of entries each
     integer :: whitened = 0                !< the same whitened; where that changes nothing, the same place
@@ -45,35 +55,41 @@ module jointfrf_manifold_plan
     integer, allocatable :: gamma(:)       !< the element where each entry of gamma is computed
     integer, allocatable :: in_rows(:)     !< the entry that is number i of the matrix gamma row by row
     integer, allocatable :: kk_first(:)    !< the entry before the first one of each row of kk
-    type(entry_group), allocatable :: groups(:)      !< of the columns by H and M and one residual
-    type(entry_group) :: joint_groups(1)             !< of the columns by C and all residuals
+    type(entry_group), allocatable :: groups(:)      !< of the columns by H and Q and one residual
+    type(entry_group) :: joint_groups(1)             !< of the columns by R and all residuals
   end type manifold_plan
 
 contains
 
   !> Plan for n joint DOFs.
-  !> by_c        whether columns by C are wanted
+  !> spring      Z, shape (n), N/m
+  !> by_r        whether columns by R are wanted
   !> n_target    FRFs whose residuals are wanted
   !> correlated  whether columns are whitened by a triangular factor
-  subroutine make_manifold_plan(reciprocal, n, by_c, n_target, correlated, plan, stat)
-    logical, intent(in) :: reciprocal, by_c, correlated
-    integer, intent(in) :: n, n_target
+  subroutine make_manifold_plan(reciprocal, spring, by_r, n_target, correlated, plan, stat)
+    logical, intent(in) :: reciprocal, by_r, correlated
+    real(dp), intent(in) :: spring(:)
+    integer, intent(in) :: n_target
     type(manifold_plan), intent(out) :: plan
     integer, intent(out) :: stat
+    integer :: n
 
+    n = size(spring)
     plan%reciprocal = reciprocal
     plan%n = n
     plan%n_target = n_target
     plan%correlated = correlated
     plan%n_free = merge((n*(n + 1))/2, n*n, reciprocal)
     plan%n_entry = merge(n*(2*n + 1), 4*n*n, reciprocal)
-    plan%n_column = 2*plan%n_free + merge(plan%n_free, 0, by_c) + n_target
-    allocate (plan%row(plan%n_free), plan%column(plan%n_free), plan%gamma_row(plan%n_entry), &
+    plan%n_column = 2*plan%n_free + merge(plan%n_free, 0, by_r) + n_target
+    plan%has_springs = any(spring > 0.0_dp)
+    allocate (plan%spring(n), plan%row(plan%n_free), plan%column(plan%n_free), plan%gamma_row(plan%n_entry), &
               plan%gamma_column(plan%n_entry), plan%gamma(plan%n_entry), plan%in_rows(plan%n_entry), plan%kk_first(n), &
               plan%groups(number_of_groups(plan)), stat=stat)
     if (stat /= 0) return
+    plan%spring(:) = spring
     call list_triangle(reciprocal, n, plan%row, plan%column)
-    call place_elements(plan, by_c)
+    call place_elements(plan, by_r)
     call list_entries(plan, stat)
     if (stat == 0) call list_groups(plan, stat)
     if (stat == 0) call set_group(0, plan%n_entry, plan%n_column - 2*plan%n_free, plan%joint_groups(1), stat)
@@ -97,33 +113,49 @@ contains
     end do
   end subroutine list_triangle
 
-  subroutine place_elements(plan, by_c)
+  subroutine place_elements(plan, by_r)
     type(manifold_plan), intent(inout) :: plan
-    logical, intent(in) :: by_c
+    logical, intent(in) :: by_r
     integer :: n2, i
 
     n2 = plan%n*plan%n
-    plan%c = run(n2)
+    plan%r = run(n2)
     plan%h = run(n2)
-    plan%m = run(n2)
+    plan%q = run(n2)
     plan%best_h = run(n2)
-    plan%best_m = run(n2)
+    plan%best_q = run(n2)
     plan%right = run(n2)
     plan%left = run(n2)
     plan%jk = run(n2)
     plan%kj = run(n2)
     plan%kk = run(n2)
-    plan%kj_c = run(n2)
-    plan%jk_c = run(n2)
+    plan%kj_r = run(n2)
+    plan%jk_r = run(n2)
+    plan%a = plan%right
+    plan%a_left = plan%left
+    plan%h_t = plan%h
+    plan%t_h = plan%h
+    plan%kj_t = plan%kj
+    plan%t_jk = plan%jk
+    if (plan%has_springs) then
+      plan%t = run(n2)
+      plan%t_left = run(n2)
+      plan%a = run(n2)
+      plan%a_left = run(n2)
+      plan%h_t = run(n2)
+      plan%t_h = run(n2)
+      plan%kj_t = run(n2)
+      plan%t_jk = run(n2)
+    end if
     plan%target = run(plan%n_entry*plan%n_target)
     plan%columns = run(plan%n_entry*plan%n_column)
     plan%whitened = plan%columns
     if (plan%correlated) plan%whitened = run(plan%n_entry*plan%n_column)
     plan%normal = run(plan%n_column**2)
-    if (by_c) then
+    if (by_r) then
       plan%result = run(plan%n_free**2)
-      do i = 1, size(plan%of_c)
-        plan%of_c(i) = run(n2)
+      do i = 1, size(plan%of_r)
+        plan%of_r(i) = run(n2)
       end do
     end if
     plan%unused = run(4)
@@ -196,7 +228,7 @@ contains
     end subroutine add
   end subroutine list_entries
 
-  !> Groups of the columns by H and M and one residual.
+  !> Groups of the columns by H and Q and one residual.
   pure function number_of_groups(plan) result(groups)
     type(manifold_plan), intent(in) :: plan
     integer :: groups
@@ -205,7 +237,7 @@ contains
     if (.not. plan%correlated) groups = plan%n + merge(0, plan%n, plan%reciprocal) + 1 + plan%n_free
   end function number_of_groups
 
-  !> Columns by H are zero in most rows of jk, in most columns of kj, and but for one entry in jj; those by M in jj.
+  !> Columns by H are zero in most rows of jk, in most columns of kj, and but for one entry in jj; those by Q in jj.
   subroutine list_groups(plan, stat)
     type(manifold_plan), intent(inout) :: plan
     integer, intent(out) :: stat
@@ -239,7 +271,7 @@ contains
 
   contains
 
-    !> n entries with some columns by H, and those by M.
+    !> n entries with some columns by H, and those by Q.
     subroutine add_group(first, by_h, group)
       integer, intent(in) :: first
       logical, intent(in) :: by_h(:)

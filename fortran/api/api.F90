@@ -54,7 +54,7 @@ module jointfrf
     check_difference_weights, check_expect_on_joint, check_fit_diagonal_joint, check_invert, check_joint_forms, &
     check_joint_normal_equations, check_matrices, check_modify, check_monte_carlo, check_pollute, &
     check_project_on_joint, check_rational_fit, check_receptance, check_receptance_banded, &
-    check_receptance_modal, check_relocate_poles, check_solve, check_transform
+    check_receptance_modal, check_relocate_poles, check_solve, check_springs, check_transform
   use jointfrf_compliance, only: joint_compliance
   use jointfrf_compliance_noise, only: compliance_covariance, compliance_factors
   use jointfrf_coupling, only: couple
@@ -87,6 +87,7 @@ module jointfrf
   public :: jf_couple, jf_couple_bodies, jf_modify, jf_find_modification
   public :: jf_ismm, jf_inverse_substructuring, jf_decouple
   public :: jf_joint_compliance, jf_compliance_factors, jf_compliance_covariance
+  public :: jf_project_with_springs, jf_expect_with_springs, jf_forms_with_springs
   public :: jf_project_on_joint, jf_expect_on_joint, jf_joint_forms, jf_fit_diagonal_joint, &
     jf_joint_normal_equations
   public :: jf_difference_weights, jf_central_difference, jf_transform
@@ -677,8 +678,8 @@ contains
     call hold_traps(host)
     info = check_project_on_joint(trans, reciprocal, n, n_correlated, n_freq, steps, least_gain)
     if (info == info_good) then
-      call project_on_joint(is_transposed(trans), reciprocal == 1, steps, least_gain, gamma, inverse_std, whitening, &
-                            c_joint, free_h, free_m, squares, line_info, info)
+      call project_on_joint(is_transposed(trans), reciprocal == 1, steps, least_gain, spread(0.0_c_double, 1, int(n)), &
+                            gamma, inverse_std, whitening, c_joint, free_h, free_m, squares, line_info, info)
     end if
     call release_traps(host)
   end subroutine jf_project_on_joint
@@ -711,8 +712,8 @@ contains
     call hold_traps(host)
     info = check_expect_on_joint(trans, reciprocal, n, n_correlated, n_freq, share, spread_m)
     if (info == info_good) then
-      call expect_on_joint(is_transposed(trans), reciprocal == 1, share, spread_m, inverse_std, whitening, c_joint, &
-                           free_h, free_m, line_info, info)
+      call expect_on_joint(is_transposed(trans), reciprocal == 1, share, spread_m, spread(0.0_c_double, 1, int(n)), &
+                           inverse_std, whitening, c_joint, free_h, free_m, line_info, info)
     end if
     call release_traps(host)
   end subroutine jf_expect_on_joint
@@ -750,11 +751,123 @@ contains
     call hold_traps(host)
     info = check_joint_forms(trans, reciprocal, n, n_free, n_correlated, n_freq, n_target)
     if (info == info_good) then
-      call joint_forms(is_transposed(trans), reciprocal == 1, gamma, inverse_std, whitening, c_joint, free_h, free_m, &
-                       information, gradient, squares, line_info, info)
+      call joint_forms(is_transposed(trans), reciprocal == 1, spread(0.0_c_double, 1, int(n)), gamma, inverse_std, &
+                       whitening, c_joint, free_h, free_m, information, gradient, squares, line_info, info)
     end if
     call release_traps(host)
   end subroutine jf_joint_forms
+
+  !> The FRFs nearest to measured ones that fit a joint in parallel with reference springs, on every line.
+  !> With the springs Z, a diagonal matrix, and R = (K* + Z)^-1 such FRFs are gamma_jj = H, gamma_jk = H F,
+  !> gamma_kj = F' H, gamma_kk = F' H F + R A with A = 1 - Q R, A' = 1 - R Q, F = (1 - Z R) A, F' = A' (1 - R Z) and two
+  !> free matrices H and Q. The form is regular for rigid DOFs, R = 0, and for free ones, R = 1/Z. With Z = 0 it is the
+  !> form of jf_project_on_joint, with R for C and Q for M.
+  !> reciprocal, n, n_correlated, steps, least_gain, gamma, inverse_std, whitening    as in jf_project_on_joint
+  !> spring         Z, shape (n), >= 0, N/m
+  !> r_joint        R, shape (n, n, n_freq), m/N
+  !> free_h         H, shape (n, n, n_freq), m/N: where to begin, then the result; symmetric with reciprocal 1
+  !> free_q         Q, shape (n, n, n_freq), N/m: likewise
+  !> squares        weighted squares of the distance, shape (n_freq)
+  !> line_info      as in jf_project_on_joint
+  subroutine jf_project_with_springs(trans, reciprocal, n, n_correlated, n_freq, steps, least_gain, spring, gamma, &
+                                     inverse_std, whitening, r_joint, free_h, free_q, squares, line_info, info) &
+    bind(C, name='jf_project_with_springs_')
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: reciprocal, n, n_correlated, n_freq, steps
+    real(c_double), intent(in) :: least_gain, spring(n)
+    complex(c_double_complex), target, intent(in) :: gamma(2_long*n, 2_long*n, n_freq)
+    real(c_double), target, intent(in) :: inverse_std(2_long*n, 2_long*n, n_freq)
+    real(c_double), target, intent(in) :: whitening(n_correlated, n_correlated, n_freq)
+    complex(c_double_complex), target, intent(in) :: r_joint(n, n, n_freq)
+    complex(c_double_complex), target, intent(inout) :: free_h(n, n, n_freq), free_q(n, n, n_freq)
+    real(c_double), target, intent(out) :: squares(n_freq)
+    integer(ip), target, intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
+
+    call hold_traps(host)
+    info = check_project_on_joint(trans, reciprocal, n, n_correlated, n_freq, steps, least_gain)
+    if (info == info_good) info = check_springs(spring, -8_ip)
+    if (info == info_good) then
+      call project_on_joint(is_transposed(trans), reciprocal == 1, steps, least_gain, spring, gamma, inverse_std, &
+                            whitening, r_joint, free_h, free_q, squares, line_info, info)
+    end if
+    call release_traps(host)
+  end subroutine jf_project_with_springs
+
+  !> The expected FRFs of a joint in parallel with reference springs near FRFs that fit it, if M is normal about 0.
+  !> M = (Y_B + K*^-1)^-1 = Z (1 - R Z) + (1 - Z R) Q (1 - R Z), where Y_B is the receptance of side k alone; of 1 - Z R
+  !> the diagonal is taken. Else as jf_expect_on_joint.
+  !> reciprocal, n, n_correlated, inverse_std, whitening    as in jf_project_on_joint
+  !> share, spread_m    as in jf_expect_on_joint
+  !> spring, r_joint    as in jf_project_with_springs
+  !> free_h         H, shape (n, n, n_freq), m/N: of the FRFs that fit the joint, then expected
+  !> free_q         Q, shape (n, n, n_freq), N/m: likewise
+  !> line_info      as in jf_project_on_joint
+  subroutine jf_expect_with_springs(trans, reciprocal, n, n_correlated, n_freq, share, spread_m, spring, inverse_std, &
+                                    whitening, r_joint, free_h, free_q, line_info, info) &
+    bind(C, name='jf_expect_with_springs_')
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: reciprocal, n, n_correlated, n_freq
+    real(c_double), intent(in) :: share
+    real(c_double), target, intent(in) :: spread_m(n, n, n_freq)
+    real(c_double), intent(in) :: spring(n)
+    real(c_double), target, intent(in) :: inverse_std(2_long*n, 2_long*n, n_freq)
+    real(c_double), target, intent(in) :: whitening(n_correlated, n_correlated, n_freq)
+    complex(c_double_complex), target, intent(in) :: r_joint(n, n, n_freq)
+    complex(c_double_complex), target, intent(inout) :: free_h(n, n, n_freq), free_q(n, n, n_freq)
+    integer(ip), target, intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
+
+    call hold_traps(host)
+    info = check_expect_on_joint(trans, reciprocal, n, n_correlated, n_freq, share, spread_m)
+    if (info == info_good) info = check_springs(spring, -8_ip)
+    if (info == info_good) then
+      call expect_on_joint(is_transposed(trans), reciprocal == 1, share, spread_m, spring, inverse_std, whitening, &
+                           r_joint, free_h, free_q, line_info, info)
+    end if
+    call release_traps(host)
+  end subroutine jf_expect_with_springs
+
+  !> Information of measured FRFs on the compliance R of a joint in parallel with reference springs, near FRFs that fit
+  !> it, with H and Q free. The form is that of jf_joint_forms, d being the change of the free entries of R.
+  !> reciprocal, n, n_correlated, inverse_std, whitening    as in jf_project_on_joint
+  !> n_free, n_target, gamma    as in jf_joint_forms
+  !> spring, r_joint    as in jf_project_with_springs
+  !> free_h         H of the point, shape (n, n, n_freq), m/N
+  !> free_q         Q of the point, shape (n, n, n_freq), N/m
+  !> information    W, shape (n_free, n_free, n_freq), (N/m)^2
+  !> gradient       p, shape (n_free, n_freq, n_target), N/m
+  !> squares        s, shape (n_freq, n_target)
+  !> line_info      as in jf_project_on_joint
+  subroutine jf_forms_with_springs(trans, reciprocal, n, n_free, n_correlated, n_freq, n_target, spring, gamma, &
+                                   inverse_std, whitening, r_joint, free_h, free_q, information, gradient, squares, &
+                                   line_info, info) &
+    bind(C, name='jf_forms_with_springs_')
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: reciprocal, n, n_free, n_correlated, n_freq, n_target
+    real(c_double), intent(in) :: spring(n)
+    complex(c_double_complex), target, intent(in) :: gamma(2_long*n, 2_long*n, n_freq, n_target)
+    real(c_double), target, intent(in) :: inverse_std(2_long*n, 2_long*n, n_freq)
+    real(c_double), target, intent(in) :: whitening(n_correlated, n_correlated, n_freq)
+    complex(c_double_complex), target, intent(in) :: r_joint(n, n, n_freq), free_h(n, n, n_freq), free_q(n, n, n_freq)
+    complex(c_double_complex), target, intent(out) :: information(n_free, n_free, n_freq)
+    complex(c_double_complex), target, intent(out) :: gradient(n_free, n_freq, n_target)
+    real(c_double), target, intent(out) :: squares(n_freq, n_target)
+    integer(ip), target, intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
+
+    call hold_traps(host)
+    info = check_joint_forms(trans, reciprocal, n, n_free, n_correlated, n_freq, n_target)
+    if (info == info_good) info = check_springs(spring, -8_ip)
+    if (info == info_good) then
+      call joint_forms(is_transposed(trans), reciprocal == 1, spring, gamma, inverse_std, whitening, r_joint, free_h, &
+                       free_q, information, gradient, squares, line_info, info)
+    end if
+    call release_traps(host)
+  end subroutine jf_forms_with_springs
 
   !> The joint without cross terms that minimises quadratic forms of its compliance, as jf_joint_forms finds them.
   !> The squares are the sum over the lines of s - 2 Re(d^H p) + d^H W d, where d = C - C0 has an entry for each DOF:

@@ -19,7 +19,7 @@ module jointfrf_checks
   public :: check_couple, check_couple_bodies, check_modify, check_matrices, check_decouple, check_compliance_factors
   public :: check_compliance_covariance, check_expect_on_joint, check_fit_diagonal_joint, check_joint_forms
   public :: check_joint_normal_equations
-  public :: check_project_on_joint
+  public :: check_project_on_joint, check_springs
   public :: check_difference_weights, check_central_difference, check_transform, check_pollute, check_monte_carlo
   public :: check_brick_matrices, check_brick_quality, check_rational_fit, check_relocate_poles
 
@@ -289,6 +289,15 @@ contains
     if (reciprocal /= 0 .and. reciprocal /= 1) info = -2
     if (unknown_order(trans)) info = -1
   end function check_project_on_joint
+
+  !> Reference springs; `wrong` is the code of their argument.
+  pure function check_springs(spring, wrong) result(info)
+    real(c_double), intent(in) :: spring(:)
+    integer(ip), intent(in) :: wrong
+    integer(ip) :: info
+
+    info = merge(info_good, wrong, all(spring >= 0.0_c_double .and. spring <= huge(spring)))
+  end function check_springs
 
   pure function check_expect_on_joint(trans, reciprocal, n, n_correlated, n_freq, share, spread_m) result(info)
     character(kind=c_char), intent(in) :: trans

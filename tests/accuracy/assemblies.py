@@ -39,12 +39,16 @@ def truth_of(case: str, seed: int) -> dict[str, float]:
     return found | moduli | {"machine/density": own["MASS"] / own["KEYS"]["parts"]["machine"]["mass"]}
 
 
+def fitted(case: str, seed: int) -> jf.Fit:
+    """Return the fit of one draw."""
+    return jf.measured_assembly(_CASES / case / "assembly.toml", _module(case)["measured"](seed)).fit()
+
+
 def one_draw(case: str, seed: int) -> dict[str, tuple[float, bool]]:
     """Error over standard error, and whether the interval holds the truth, of each parameter."""
-    frfs = _module(case)["measured"](seed)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        fit = jf.measured_assembly(_CASES / case / "assembly.toml", frfs).fit()
+        fit = fitted(case, seed)
     intervals, truth = fit.confidence_interval(0.95), truth_of(case, seed)
     if truth.keys() != fit.value.keys():
         raise ValueError(f"the fit has {', '.join(fit.value)}")

@@ -112,18 +112,23 @@ def exact(trial: ModelTrial) -> np.ndarray:
     return own.receptance(FREQ, CHANNELS[trial.channels], CHANNELS[trial.channels])
 
 
-def one_draw(trial: ModelTrial, seed: int) -> tuple[dict[str, float], dict[str, tuple[float, float]], bool, float]:
-    """Values, intervals, whether the residual is noise, seconds."""
+def fitted(trial: ModelTrial, seed: int) -> jf.Fit:
+    """Return the fit of one draw."""
     channels = CHANNELS[trial.channels]
     # Noise of its own for each trial: the same one would make all rows lucky together.
     h = jf.pollute(exact(trial), trial.level, seed=1000 * TRIALS.index(trial) + seed)
     joint: jf.Joint | jf.LawJoint = GUESS
     if trial.wrong == "rotation taken as rigid":
         joint = jf.LawJoint({"y": jf.SpringLaw(1e5, c=5.0)}, rigid=["theta"])
+    return jf.identify_model(FREQ, h, whole(joint, unknown=trial.unknown), channels, channels)
+
+
+def one_draw(trial: ModelTrial, seed: int) -> tuple[dict[str, float], dict[str, tuple[float, float]], bool, float]:
+    """Values, intervals, whether the residual is noise, seconds."""
     start = time.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        fit = jf.identify_model(FREQ, h, whole(joint, unknown=trial.unknown), channels, channels)
+        fit = fitted(trial, seed)
         seconds = time.perf_counter() - start
         return fit.value, fit.confidence_interval(0.95), fit.test.is_noise, seconds
 

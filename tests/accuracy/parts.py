@@ -56,8 +56,8 @@ def exact() -> tuple[dict[str, jf.Model], dict[str, np.ndarray], np.ndarray]:
     return models, h, jf.Assembly(*parts, TRUE).receptance(FREQ, CHANNELS, CHANNELS)
 
 
-def one_draw(one: Row, row: int, number: int) -> tuple[dict[str, float], dict[str, float], list[bool], bool, float]:
-    """Return values, standard errors, which intervals hold, whether the residual is noise, and seconds of one draw."""
+def fitted(one: Row, row: int, number: int) -> jf.Fit:
+    """Return the fit of one draw."""
     rng = np.random.default_rng([row, number, 32])
     models, of_parts, of_assembly = exact()
 
@@ -71,10 +71,16 @@ def one_draw(one: Row, row: int, number: int) -> tuple[dict[str, float], dict[st
         else jf.Substructure(models[name], DOFS[name][:2], exact=True)
         for name in "AB"
     ]
-    h, start = noisy(of_assembly, one.assembly), time.process_time()
+    h = noisy(of_assembly, one.assembly)
+    return jf.identify_model(FREQ, h, jf.Assembly(*sides, GUESS), CHANNELS, CHANNELS)
+
+
+def one_draw(one: Row, row: int, number: int) -> tuple[dict[str, float], dict[str, float], list[bool], bool, float]:
+    """Return values, standard errors, which intervals hold, whether the residual is noise, and seconds of one draw."""
+    start = time.process_time()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        fit = jf.identify_model(FREQ, h, jf.Assembly(*sides, GUESS), CHANNELS, CHANNELS)
+        fit = fitted(one, row, number)
         interval = fit.confidence_interval(0.95)
     inside = [interval[name][0] <= true <= interval[name][1] for name, true in TRUTH.items()]
     return fit.value, fit.std_error, inside, bool(fit.residual_is_noise), time.process_time() - start

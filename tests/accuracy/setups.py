@@ -66,8 +66,8 @@ def loaded(h: np.ndarray, at: np.ndarray, mass: float) -> np.ndarray:
     return h - h[:, :, at] @ np.linalg.solve(np.eye(at.size) + added @ h[:, at][:, :, at], added @ h[:, at])
 
 
-def one_draw(one: Test, row: int, number: int) -> tuple[dict[str, float], dict[str, tuple[float, float]], bool, float]:
-    """Return values, intervals, whether the residual is noise, and seconds of one draw."""
+def drawn(one: Test, row: int, number: int) -> tuple[np.ndarray, jf.SetUps]:
+    """Return the FRFs of one draw and their set-ups."""
     rng = np.random.default_rng([row, number, 33])
     h, of = np.empty_like(exact()), np.empty((6, 6), int)
     for setup, own in enumerate(np.array_split(rng.permutation(6), one.setups)):
@@ -79,11 +79,21 @@ def one_draw(one: Test, row: int, number: int) -> tuple[dict[str, float], dict[s
     h *= 1 + one.common * rng.standard_normal()
     h = jf.pollute(h, LEVEL, seed=int(rng.integers(2**31)))
     names = [f"set-up {number + 1}" for number in range(one.setups)]
-    setups = jf.SetUps(names, of, gain=one.own if one.said else None, common_gain=one.common)
+    return h, jf.SetUps(names, of, gain=one.own if one.said else None, common_gain=one.common)
+
+
+def fitted(one: Test, row: int, number: int) -> jf.Fit:
+    """Return the fit of one draw."""
+    h, setups = drawn(one, row, number)
+    return jf.identify(FREQ, h, DOFS, damping="viscous", setups=setups)
+
+
+def one_draw(one: Test, row: int, number: int) -> tuple[dict[str, float], dict[str, tuple[float, float]], bool, float]:
+    """Return values, intervals, whether the residual is noise, and seconds of one draw."""
     start = time.process_time()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        fit = jf.identify(FREQ, h, DOFS, damping="viscous", setups=setups)
+        fit = fitted(one, row, number)
         interval = fit.confidence_interval(0.95)
     return fit.value, interval, bool(fit.residual_is_noise), time.process_time() - start
 

@@ -109,16 +109,22 @@ def exact_frfs(pair: Pair) -> np.ndarray:
     return pair.truth().receptance(FREQ, pair.names(), pair.names())
 
 
-def one_draw(pair: Pair, model_error: float | None, seed: int, *, exact: bool = False) -> tuple:
-    """Which intervals hold, half their width over the value, and whether a warning says that the models do not fit."""
+def fitted(pair: Pair, model_error: float | None, seed: int, *, exact: bool = False) -> jf.Fit:
+    """Return the fit of one draw."""
     h = jf.pollute(exact_frfs(pair), POINTS[pair.points][1], seed=seed)
     channels = pair.names(pair.coarse)
+    return jf.identify_model(FREQ, h, pair.believed(model_error, exact=exact), channels, channels)
+
+
+def one_draw(pair: Pair, model_error: float | None, seed: int, *, exact: bool = False) -> tuple:
+    """Which intervals hold, half their width over the value, and whether a warning says that the models do not fit."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        fit = jf.identify_model(FREQ, h, pair.believed(model_error, exact=exact), channels, channels)
+        fit = fitted(pair, model_error, seed, exact=exact)
         low, high = np.array([fit.intervals.of(name, 0.95) for name in TRUE]).T
     true = np.array(list(TRUE.values()))
-    said = any(one.severity == "warning" and one.kind in ("residual", "model", "prior") for one in fit.findings)
+    codes = {one.code for one in fit.findings if one.severity == "warning"}
+    said = not codes.isdisjoint(("residual-large", "model-error", "prior-contradicted"))
     return (low <= true) & (true <= high), (high - low) / (2 * true), said
 
 

@@ -3,7 +3,7 @@
 program test_manifold
   use testing, only: check, check_close, check_same, dp, finish, infinity, ip, not_a_number, random_lines, seed, &
     set_threads, transposed, uniform
-  use jointfrf, only: jf_expect_on_joint
+  use jointfrf, only: jf_expect_on_joint, jf_expect_with_springs, jf_forms_with_springs, jf_project_with_springs
   use jointfrf_manifold, only: expect_on_joint, joint_forms, project_on_joint
   use jointfrf_engine, only: engine_automatic, engine_lapack, engine_plain, set_engine
   implicit none
@@ -14,6 +14,7 @@ program test_manifold
   type :: sample
     logical :: reciprocal
     integer :: n, n_free, n_entry
+    real(dp), allocatable :: spring(:)
     complex(dp), allocatable :: h(:, :, :), m(:, :, :), c(:, :, :), gamma(:, :, :)
     real(dp), allocatable :: w(:, :, :), whitening(:, :, :)
   end type sample
@@ -34,7 +35,20 @@ program test_manifold
   call expected(2, .true., .true.)
   call expected(3, .false., .false.)
   call expected(6, .true., .false.)
+  call exact(1, .true., .false., 0.8_dp)
+  call exact(3, .true., .true., 0.8_dp)
+  call exact(2, .false., .false., 0.8_dp)
+  call stationary(2, .true., .false., 0.5_dp)
+  call stationary(3, .false., .false., 0.5_dp)
+  call other_joint(2, .true., .false., 0.7_dp)
+  call other_joint(2, .false., .true., 0.7_dp)
+  call other_joint(3, .true., .false., 0.7_dp)
+  call other_joint(6, .true., .false., 0.3_dp)
+  call expected(1, .true., .false., 0.6_dp)
+  call expected(3, .true., .false., 0.6_dp)
+  call expected(2, .false., .true., 0.6_dp)
   call expected_arguments()
+  call spring_arguments()
   call orders_of_storage(.true.)
   call orders_of_storage(.false.)
   call bad_lines()
@@ -44,21 +58,24 @@ program test_manifold
 
 contains
 
-  function make_sample(n, reciprocal, correlated) result(s)
+  function make_sample(n, reciprocal, correlated, spring) result(s)
     integer, intent(in) :: n
     logical, intent(in) :: reciprocal, correlated
+    real(dp), intent(in), optional :: spring
     type(sample) :: s
     integer :: i, p, q
 
     s%reciprocal = reciprocal
     s%n = n
+    allocate (s%spring(n), source=0.0_dp)
+    if (present(spring)) s%spring = [(spring*(1 + 0.2_dp*i), i=1, n)]
     s%n_free = merge((n*(n + 1))/2, n*n, reciprocal)
     s%n_entry = merge(n*(2*n + 1), 4*n*n, reciprocal)
     allocate (s%h(n, n, lines), s%m(n, n, lines), s%c(n, n, lines), s%gamma(2*n, 2*n, lines))
     s%h = square(s)
     s%m = square(s)/n
     s%c = square(s)/n
-    s%gamma = frfs(s%h, s%m, s%c)
+    s%gamma = frfs(s%spring, s%h, s%m, s%c)
     q = merge(s%n_entry, 0, correlated)
     allocate (s%w(2*n, 2*n, lines), s%whitening(q, q, lines))
     do i = 1, lines
@@ -86,25 +103,30 @@ contains
     if (s%reciprocal) a = (a + transposed(a))/2
   end function square
 
-  !> The FRFs of H, M and C.
-  function frfs(h, m, c) result(gamma)
+  !> The FRFs of H, Q (here m) and R (here c) with reference springs.
+  function frfs(spring, h, m, c) result(gamma)
+    real(dp), intent(in) :: spring(:)
     complex(dp), intent(in) :: h(:, :, :), m(:, :, :), c(:, :, :)
-    complex(dp) :: gamma(2*size(h, 1), 2*size(h, 1), size(h, 3)), right(size(h, 1), size(h, 1))
-    complex(dp) :: left(size(h, 1), size(h, 1))
+    complex(dp) :: gamma(2*size(h, 1), 2*size(h, 1), size(h, 3))
+    complex(dp), dimension(size(h, 1), size(h, 1)) :: right, left, z, one
     integer :: i, a, n
 
     n = size(h, 1)
+    z = 0
+    one = 0
+    do a = 1, n
+      z(a, a) = spring(a)
+      one(a, a) = 1
+    end do
     do i = 1, size(h, 3)
-      right = -matmul(m(:, :, i), c(:, :, i))
-      left = -matmul(c(:, :, i), m(:, :, i))
-      do a = 1, n
-        right(a, a) = right(a, a) + 1
-        left(a, a) = left(a, a) + 1
-      end do
-      gamma(:n, :n, i) = h(:, :, i)
-      gamma(:n, n + 1:, i) = matmul(h(:, :, i), right)
-      gamma(n + 1:, :n, i) = matmul(left, h(:, :, i))
-      gamma(n + 1:, n + 1:, i) = matmul(matmul(left, h(:, :, i)) + c(:, :, i), right)
+      associate (r => c(:, :, i), q => m(:, :, i))
+        right = matmul(one - matmul(z, r), one - matmul(q, r))
+        left = matmul(one - matmul(r, q), one - matmul(r, z))
+        gamma(:n, :n, i) = h(:, :, i)
+        gamma(:n, n + 1:, i) = matmul(h(:, :, i), right)
+        gamma(n + 1:, :n, i) = matmul(left, h(:, :, i))
+        gamma(n + 1:, n + 1:, i) = matmul(left, matmul(h(:, :, i), right)) + r - matmul(r, matmul(q, r))
+      end associate
     end do
   end function frfs
 
@@ -143,55 +165,59 @@ contains
     integer, intent(in) :: steps
     integer(ip) :: line_info(lines), info
 
-    call project_on_joint(.false., s%reciprocal, int(steps, ip), gain, s%gamma, s%w, s%whitening, s%c, h, m, squares, &
+    call project_on_joint(.false., s%reciprocal, int(steps, ip), gain, s%spring, s%gamma, s%w, s%whitening, &
+        s%c, h, m, squares, &
                           line_info, info)
     call check(info == 0 .and. all(line_info == 0), 'good')
   end subroutine project
 
-  subroutine exact(n, reciprocal, correlated)
+  subroutine exact(n, reciprocal, correlated, spring)
     integer, intent(in) :: n
     logical, intent(in) :: reciprocal, correlated
+    real(dp), intent(in), optional :: spring
     type(sample) :: s
     complex(dp) :: h(n, n, lines), m(n, n, lines)
     real(dp) :: squares(lines)
 
-    s = make_sample(n, reciprocal, correlated)
+    s = make_sample(n, reciprocal, correlated, spring)
     h = s%h + 0.02_dp*square(s)
     m = s%m + 0.02_dp*square(s)
     call project(s, h, m, squares, 40)
     call check(all(squares < 1.0e-6_dp), 'exact FRFs have no distance')
-    call check(maxval(abs(squares - distance(s, frfs(h, m, s%c)))) < 1.0e-8_dp, 'squares of exact FRFs')
+    call check(maxval(abs(squares - distance(s, frfs(s%spring, h, m, s%c)))) < 1.0e-8_dp, 'squares of exact FRFs')
   end subroutine exact
 
   !> No change of H or M comes nearer to FRFs with noise.
-  subroutine stationary(n, reciprocal, correlated)
+  subroutine stationary(n, reciprocal, correlated, spring)
     integer, intent(in) :: n
     logical, intent(in) :: reciprocal, correlated
+    real(dp), intent(in), optional :: spring
     type(sample) :: s
     complex(dp) :: h(n, n, lines), m(n, n, lines), dh(n, n, lines), dm(n, n, lines)
     real(dp) :: squares(lines), there(lines), back(lines)
     integer :: k
 
-    s = make_sample(n, reciprocal, correlated)
+    s = make_sample(n, reciprocal, correlated, spring)
     s%gamma = s%gamma + 0.02_dp*random_lines(2*n, 2*n, lines)
     h = s%h
     m = s%m
     call project(s, h, m, squares, 60)
-    call check_close(sum(squares), sum(distance(s, frfs(h, m, s%c))), 1.0e-12_dp, 'squares')
+    call check_close(sum(squares), sum(distance(s, frfs(s%spring, h, m, s%c))), 1.0e-12_dp, 'squares')
     do k = 1, 4
       dh = 1.0e-3_dp*square(s)
       dm = 1.0e-3_dp*square(s)
-      there = distance(s, frfs(h + dh, m + dm, s%c))
-      back = distance(s, frfs(h - dh, m - dm, s%c))
+      there = distance(s, frfs(s%spring, h + dh, m + dm, s%c))
+      back = distance(s, frfs(s%spring, h - dh, m - dm, s%c))
       call check(all(there + back > 2*squares), 'a minimum')
       call check(all(abs(there - back) < 0.1_dp*(there + back - 2*squares)), 'stationary')
     end do
   end subroutine stationary
 
   !> What a projection for another C costs is what W says.
-  subroutine other_joint(n, reciprocal, correlated)
+  subroutine other_joint(n, reciprocal, correlated, spring)
     integer, intent(in) :: n
     logical, intent(in) :: reciprocal, correlated
+    real(dp), intent(in), optional :: spring
     type(sample) :: s
     complex(dp) :: h(n, n, lines), m(n, n, lines), d(n, n, lines), change(n*n)
     complex(dp), allocatable :: information(:, :, :), gradient(:, :, :)
@@ -199,10 +225,11 @@ contains
     integer(ip) :: line_info(lines), info
     integer :: i, a, b, k
 
-    s = make_sample(n, reciprocal, correlated)
+    s = make_sample(n, reciprocal, correlated, spring)
     s%w = 1.0e4_dp*s%w
     allocate (information(s%n_free, s%n_free, lines), gradient(s%n_free, lines, 1))
-    call joint_forms(.false., reciprocal, reshape(s%gamma, [2*n, 2*n, lines, 1]), s%w, s%whitening, s%c, s%h, s%m, &
+    call joint_forms(.false., reciprocal, s%spring, reshape(s%gamma, [2*n, 2*n, lines, 1]), s%w, s%whitening, &
+        s%c, s%h, s%m, &
                      information, gradient, left, line_info, info)
     call check(info == 0 .and. all(line_info == 0), 'forms: good')
     call check(all(left < 1.0e-12_dp), 'forms: no distance')
@@ -226,9 +253,10 @@ contains
 
   !> Expected H and M minimise squares of M over its deviations and of the linear change of the FRFs over their error:
   !> no other step is lower. A line that holds NaN is NaN.
-  subroutine expected(n, reciprocal, correlated)
+  subroutine expected(n, reciprocal, correlated, spring)
     integer, intent(in) :: n
     logical, intent(in) :: reciprocal, correlated
+    real(dp), intent(in), optional :: spring
     real(dp), parameter :: share = 0.3_dp
     type(sample) :: s
     complex(dp), dimension(n, n, lines) :: h, m, dh, dm
@@ -236,15 +264,16 @@ contains
     integer(ip) :: line_info(lines), info
     integer :: k
 
-    s = make_sample(n, reciprocal, correlated)
+    s = make_sample(n, reciprocal, correlated, spring)
     s%c = 0.1_dp*s%c
+    if (present(spring)) call make_diagonal(s)
     spread_m = 0.5_dp
     spread_m(1, n, :) = 2
     if (reciprocal) spread_m(n, 1, :) = 2
     h = s%h
     m = s%m
     m(n, 1, 4) = cmplx(not_a_number(), 0.0_dp, dp)
-    call expect_on_joint(.false., reciprocal, share, spread_m, s%w, s%whitening, s%c, h, m, line_info, info)
+    call expect_on_joint(.false., reciprocal, share, spread_m, s%spring, s%w, s%whitening, s%c, h, m, line_info, info)
     call check(info == 1 .and. line_info(4) == -1 .and. count(line_info == 0) == lines - 1, 'expected: one bad line')
     call check(.not. abs(m(1, 1, 4)) <= huge(1.0_dp), 'expected: a bad line is NaN')
     h(:, :, 4) = s%h(:, :, 4)
@@ -259,7 +288,19 @@ contains
     end do
   end subroutine expected
 
-  !> Squares of M and of the change of the FRFs, which is linear in those of H and M.
+  !> A joint without cross terms, whose M has entries that depend on one entry of Q each.
+  subroutine make_diagonal(s)
+    type(sample), intent(inout) :: s
+    integer :: a, b
+
+    do a = 1, s%n
+      do b = 1, s%n
+        if (a /= b) s%c(a, b, :) = 0
+      end do
+    end do
+  end subroutine make_diagonal
+
+  !> Squares of M = Z T' + T Q T' and of the change of the FRFs, which is linear in those of H and Q.
   function expectation(s, share, spread_m, dh, dm) result(squares)
     type(sample), intent(in) :: s
     real(dp), intent(in) :: share, spread_m(:, :, :)
@@ -267,15 +308,20 @@ contains
     real(dp) :: squares(lines)
     real(dp), parameter :: little = 1.0e-6_dp
     type(sample) :: moved
+    complex(dp) :: t, entry_m
     integer :: i, a, b
 
     moved = s
-    moved%gamma = (frfs(s%h + little*dh, s%m + little*dm, s%c) - frfs(s%h - little*dh, s%m - little*dm, s%c))/(2*little)
+    moved%gamma = (frfs(s%spring, s%h + little*dh, s%m + little*dm, s%c) - &
+                   frfs(s%spring, s%h - little*dh, s%m - little*dm, s%c))/(2*little)
     squares = distance(moved, 0*moved%gamma)/share**2
     do i = 1, lines
       do a = 1, s%n
         do b = merge(a, 1, s%reciprocal), s%n
-          squares(i) = squares(i) + abs((s%m(a, b, i) + dm(a, b, i))/spread_m(a, b, i))**2
+          t = (1 - s%spring(a)*s%c(a, a, i))*(1 - s%spring(b)*s%c(b, b, i))
+          entry_m = t*(s%m(a, b, i) + dm(a, b, i))
+          if (a == b) entry_m = entry_m + s%spring(a)*(1 - s%spring(a)*s%c(a, a, i))
+          squares(i) = squares(i) + abs(entry_m/spread_m(a, b, i))**2
         end do
       end do
     end do
@@ -317,6 +363,38 @@ contains
     call check_same(m, s%m, 'expected: M is not touched')
   end subroutine try_expected
 
+  !> Springs that are negative, infinite or no number are refused before anything is touched.
+  subroutine spring_arguments()
+    type(sample) :: s
+    complex(dp) :: h(2, 2, lines), m(2, 2, lines), w(3, 3, lines), p(3, lines, 1)
+    real(dp) :: squares(lines), left(lines, 1), spread_m(2, 2, lines), bad(3)
+    integer(ip), parameter :: symmetric = 1, n = 2, none = 0, steps = 3, n_free = 3, one = 1
+    integer(ip) :: line_info(lines), info, n_freq
+    integer :: i
+
+    s = make_sample(2, .true., .false.)
+    n_freq = lines
+    spread_m = 1
+    bad = [-1.0_dp, infinity(), not_a_number()]
+    do i = 1, 3
+      h = s%h
+      m = s%m
+      s%spring(2) = bad(i)
+      call jf_project_with_springs('N', symmetric, n, none, n_freq, steps, gain, s%spring, s%gamma, s%w, &
+          s%whitening, &
+                                   s%c, h, m, squares, line_info, info)
+      call check(info == -8, 'springs of a projection')
+      call jf_expect_with_springs('N', symmetric, n, none, n_freq, 0.1_dp, spread_m, s%spring, s%w, &
+          s%whitening, s%c, &
+                                  h, m, line_info, info)
+      call check(info == -8, 'springs of an expectation')
+      call jf_forms_with_springs('N', symmetric, n, n_free, none, n_freq, one, s%spring, s%gamma, s%w, s%whitening, &
+                                 s%c, h, m, w, p, left, line_info, info)
+      call check(info == -8, 'springs of forms')
+      call check_same(h, s%h, 'springs: H is not touched')
+    end do
+  end subroutine spring_arguments
+
   !> Lines stored as C does, several targets, and a gradient for each.
   subroutine orders_of_storage(reciprocal)
     logical, intent(in) :: reciprocal
@@ -345,7 +423,8 @@ contains
     call project(s, h, m, squares, 10)
     h_t = transposed(s%h)
     m_t = transposed(s%m)
-    call project_on_joint(.true., reciprocal, 10_ip, gain, transposed(s%gamma), weights_t, factor_t, transposed(s%c), &
+    call project_on_joint(.true., reciprocal, 10_ip, gain, s%spring, transposed(s%gamma), weights_t, factor_t, &
+        transposed(s%c), &
                           h_t, m_t, squares_t, line_info, info)
     call check_same(transposed(h_t), h, 'H, transposed')
     call check_same(transposed(m_t), m, 'M, transposed')
@@ -356,14 +435,16 @@ contains
     do i = 1, 2
       targets_t(:, :, :, i) = transposed(targets(:, :, :, i))
     end do
-    call joint_forms(.false., reciprocal, targets, s%w, s%whitening, s%c, h, m, w, p, left, line_info, info)
-    call joint_forms(.true., reciprocal, targets_t, weights_t, factor_t, transposed(s%c), h_t, m_t, w_t, p_t, left_t, &
+    call joint_forms(.false., reciprocal, s%spring, targets, s%w, s%whitening, s%c, h, m, w, p, left, line_info, info)
+    call joint_forms(.true., reciprocal, s%spring, targets_t, weights_t, factor_t, transposed(s%c), h_t, m_t, &
+        w_t, p_t, left_t, &
                      line_info, info)
     call check_same(transposed(w_t), w, 'W, transposed')
     call check_close(w, conjg(transposed(w)), 0.0_dp, 'W is Hermitian')
     call check_same(p_t, p, 'gradients do not depend on the order of storage')
     call check_same(left_t(:, 2), left(:, 2), 'squares of the second target')
-    call joint_forms(.false., reciprocal, targets(:, :, :, 2:2), s%w, s%whitening, s%c, h, m, w_t, p_t(:, :, :1), &
+    call joint_forms(.false., reciprocal, s%spring, targets(:, :, :, 2:2), s%w, s%whitening, s%c, h, m, w_t, &
+        p_t(:, :, :1), &
                      left_t(:, :1), line_info, info)
     call check_close(p_t(:, :, 1:1), p(:, :, 2:2), 1.0e-10_dp, 'a target alone')
   end subroutine orders_of_storage
@@ -392,7 +473,8 @@ contains
     expected = 0
     expected([2, 3, 9, 10]) = -1
     expected(17) = -2
-    call project_on_joint(.false., .true., 10_ip, gain, s%gamma, s%w, s%whitening, s%c, h, m, squares, line_info, info)
+    call project_on_joint(.false., .true., 10_ip, gain, s%spring, s%gamma, s%w, s%whitening, s%c, h, m, &
+        squares, line_info, info)
     call check(info == 5 .and. all(line_info == expected), 'bad lines')
     do i = 1, lines
       if (expected(i) == 0) then
@@ -405,7 +487,8 @@ contains
     end do
     m = s%m
     m(:, :, 17) = 1.0e200_dp
-    call joint_forms(.false., .true., reshape(s%gamma, [2*n, 2*n, lines, 1]), s%w, s%whitening, s%c, s%h, m, w, p, &
+    call joint_forms(.false., .true., s%spring, reshape(s%gamma, [2*n, 2*n, lines, 1]), s%w, s%whitening, s%c, &
+        s%h, m, w, p, &
                      left, line_info, info)
     call check(info == 5 .and. all(line_info == expected), 'bad forms')
     do i = 1, lines
@@ -431,7 +514,8 @@ contains
     one_h = s%h
     one_m = s%m
     do i = 1, lines
-      call project_on_joint(.false., .true., 300_ip, gain, s%gamma(:, :, i:i), s%w(:, :, i:i), s%whitening, &
+      call project_on_joint(.false., .true., 300_ip, gain, s%spring, s%gamma(:, :, i:i), s%w(:, :, i:i), &
+          s%whitening, &
                             s%c(:, :, i:i), one_h(:, :, i:i), one_m(:, :, i:i), one(i:i), line_info(i:i), info)
     end do
     call check_same(one_h, h, 'H of a line alone')
@@ -464,10 +548,12 @@ contains
     integer(ip) :: line_info(0), info
 
     info = 5
-    call project_on_joint(.true., .true., 3_ip, gain, gamma, weights, factor, a, a, a, squares, line_info, info)
+    call project_on_joint(.true., .true., 3_ip, gain, [0.0_dp], gamma, weights, factor, a, a, a, squares, &
+        line_info, info)
     call check(info == 0, 'no lines')
     info = 5
-    call joint_forms(.true., .true., reshape(gamma, [2, 2, 0, 1]), weights, factor, a, a, a, w, p, left, line_info, &
+    call joint_forms(.true., .true., [0.0_dp], reshape(gamma, [2, 2, 0, 1]), weights, factor, a, a, a, w, p, &
+        left, line_info, &
                      info)
     call check(info == 0, 'no lines, forms')
   end subroutine nothing

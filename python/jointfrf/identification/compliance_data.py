@@ -19,6 +19,7 @@ from jointfrf.identification.manifold.prepare import FitProblem
 from jointfrf.identification.manifold.transforms import Transform, Transforms
 from jointfrf.identification.minimise import inverse_information
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.linear_algebra import solve
 
 __all__ = ["as_pair", "channel_names", "compliance_data", "information_shares", "line_compliance", "regenerated_frfs"]
 
@@ -127,7 +128,7 @@ def _of_group(group: GroupFit, lines: slice) -> ComplexArray:
         if unknown.any():
             c = np.where(unknown, smooth_compliance(data), c)
         on = project(data.measured, data, c, starts_on_manifold(data, c, _STEPS), _STEPS)
-        gamma = frfs_of_joint(on.h, on.m, c)
+        gamma = frfs_of_joint(on.h, on.q, c, data.reference)
     gamma[~np.isfinite(on.squares)] = np.nan
     return gamma
 
@@ -137,14 +138,14 @@ def line_compliance(found: JointEstimate, n: int) -> ComplexArray:
     whole = np.full((len(found.groups[0].used), n), np.nan + 1j * np.nan)
     for group in found.groups:
         forms, own = group.forms, group.dofs.size
-        entries = forms.compliance.shape[1]
-        rows, columns = np.diag_indices(own) if entries == own else np.triu_indices(own)
         size = np.sqrt(np.einsum("lqq->lq", forms.weight).real)
         known = (size > 0).all(axis=1) & np.isfinite(size).all(axis=1)
         outer = size[known, :, None] * size[known, None, :]
         scaled = np.linalg.pinv(forms.weight[known] / outer, rcond=_SEEN, hermitian=True)
         step = (scaled @ (forms.gradient[known] / size[known])[..., None])[..., 0] / size[known]
-        whole[np.ix_(known, group.dofs)] = (forms.compliance[known] + step)[:, rows == columns]
+        r = group.joint.matrix(forms.compliance[known] + step)
+        compliance = solve(np.eye(own) - r * group.joint.springs, r, on_singular="nan")
+        whole[np.ix_(known, group.dofs)] = np.einsum("ldd->ld", compliance)
     return whole
 
 

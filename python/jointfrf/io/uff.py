@@ -200,8 +200,7 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfSet:
     if h is None:
         limit.take(matrix.bytes(freq_hz.size))
         h = np.full((freq_hz.size, *matrix.shape), np.nan + 0j)
-    at = {channel.node for pair in pairs for channel in pair}
-    coordinates, axes = _coordinates(file, content, at), _axes(file, content, at)
+    coordinates, axes = _of_nodes(file, content, {channel.node for pair in pairs for channel in pair})
     responses, excitations = matrix.responses, matrix.excitations
     if axes:
         limit.take(matrix.bytes(freq_hz.size))
@@ -218,26 +217,23 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfSet:
     return found
 
 
-def _coordinates(file: UniversalFile, content: _Content, wanted: Collection[int]) -> dict[int, NDArray[np.float64]]:
-    """Coordinates of the nodes of the set; not of nodes that several components have, which datasets do not name."""
+def _of_nodes(
+    file: UniversalFile, content: _Content, wanted: Collection[int]
+) -> tuple[dict[int, NDArray[np.float64]], NodeAxes]:
+    """Return coordinates and local axes of the nodes of the set.
+
+    Nodes that several components have are not named by datasets: they have no coordinates, and axes of their own cannot
+    be computed.
+    """
     shared = [node for node, numbers in content.numbered.items() if len(numbers) > 1]
     number_of = {node: next(iter(numbers)) for node, numbers in content.numbered.items() if len(numbers) == 1}
     nodes = [node for node, number in number_of.items() if number in wanted]
-    places = node_coordinates(file, nodes)
+    places = {number_of[node]: place for node, place in node_coordinates(file, nodes).items()}
     if shared and file.datasets(15, 2411):
         file.note(f"coordinates of {name_some('node', shared)} are left out: several components have these numbers")
-    return {number_of[node]: place for node, place in places.items()}
-
-
-def _axes(file: UniversalFile, content: _Content, wanted: Collection[int]) -> dict[int, NDArray[np.float64] | None]:
-    """Axes of nodes of the set whose displacement system is not global; unknown if several components have a node."""
-    found = node_axes(file, set(content.numbered))
-    return {
-        number: axes if len(content.numbered[node]) == 1 else None
-        for node, axes in found.items()
-        for number in content.numbered[node]
-        if number in wanted
-    }
+    axes = {number_of[node]: own for node, own in node_axes(file, nodes).items()}
+    unknown = {number: None for node in node_axes(file, shared) for number in content.numbered[node]}
+    return places, axes | unknown
 
 
 def _in_global_axes(

@@ -33,20 +33,18 @@ def fits(joint, damping, level, count=12):
     [
         ((20.0, 0.1), "viscous", 0.01),
         pytest.param((20.0, 0.1), "viscous", 0.05, marks=pytest.mark.long),
-        pytest.param((0.0, 0.0), "none", 0.01, marks=pytest.mark.long),
+        ((0.0, 0.0), "none", 0.01),
     ],
 )
 def test_a_free_dof_is_found_and_bounded(c, damping, level):
     held = []
     for fit in fits(jf.Joint([6e5, 0.0], c, DOFS), damping, level):
         low, high = fit.confidence_interval()["k_theta"]
-        # 1/k of the rigid end of the scale would be 0 here: the structure itself has 1e3 N m/rad around the joint.
-        assert 0 <= low < high < 10
-        held.append(low == 0)
-        if low == 0:
-            assert any(
-                "k_theta: not significantly different from zero, a free DOF; at most" in one for one in fit.warnings
-            )
+        # The structure has 1e3 N m/rad around the joint.
+        assert -10 < low < high < 10
+        held.append(low <= 0 <= high)
+        if low <= 0:
+            assert any("k_theta is not significantly different from zero" in one for one in fit.warnings)
         assert fit.value["k_y"] == pytest.approx(6e5, rel=0.02)
         if c[1]:
             assert fit.value["c_theta"] == pytest.approx(c[1], rel=0.05)
@@ -68,10 +66,10 @@ def test_a_soft_dof_is_not_free():
     [("viscous", (0, 60)), ("auto", (10,)), pytest.param("auto", (0, 1, 2, 27), marks=pytest.mark.long)],
 )
 def test_a_hinge_has_both_bounds(damping, seeds):
-    """Rigid in y and free in theta, as a pin with some friction: 1/k and k are zero in one fit.
+    """Rigid in y and free in theta, as a pin with some friction.
 
-    With the FRFs nearest to 10 and 27 for those of the structure, 1/k of y would seem known a million times better; 60
-    ends at a compliance so small that nothing of its damping is left.
+    Seeds 10 and 27 would give 1/k of y a standard error a million times too small with Q of the nearest FRFs; seed 60
+    ends at a compliance so small that its damping is lost.
     """
     exact = beams(jf.Joint([1e11, 0.0], [0.0, 0.1], DOFS))
     for seed in seeds:
@@ -82,10 +80,10 @@ def test_a_hinge_has_both_bounds(damping, seeds):
         assert 1e6 < low < 1e11
         assert high == np.inf
         low, high = limits["k_theta"]
-        assert low == 0
-        assert 0.05 < high < 1
-        assert any("k_y: this DOF cannot be distinguished from a rigid one; at least" in one for one in fit.warnings)
-        assert any("k_theta: not significantly different from zero, a free DOF" in one for one in fit.warnings)
+        assert -1 < low <= 0 < high < 1
+        assert high - low > 0.05
+        assert any("k_y cannot be distinguished from rigid: at least" in one for one in fit.warnings)
+        assert any("k_theta is not significantly different from zero" in one for one in fit.warnings)
         low, high = limits["c_theta"]
         assert low < 0.1 < high
         assert fit.value["c_theta"] == pytest.approx(0.1, rel=0.01)
@@ -94,12 +92,12 @@ def test_a_hinge_has_both_bounds(damping, seeds):
 @pytest.mark.parametrize(
     ("damping", "seeds"),
     [
-        pytest.param("none", [(0.01, 0), (0.01, 1), (0.01, 18), (0.01, 21), (0.05, 1)], marks=pytest.mark.long),
+        ("none", [(0.01, 0), (0.01, 1), (0.01, 18), (0.01, 21), (0.05, 1)]),
         ("viscous", [(0.01, 1)]),
     ],
 )
 def test_a_pin_without_damping_is_free(damping, seeds):
-    """Nothing but noise is in gamma_jk of theta: no joint in compliances is near it, one in k of theta is."""
+    """gamma_jk of theta contains only noise: the compliance of theta is infinite, R is 1/Z."""
     exact, held = beams(jf.Joint([1e11, 0.0], [0.0, 0.0], DOFS)), []
     for level, seed in seeds:
         with warnings.catch_warnings():
@@ -108,8 +106,8 @@ def test_a_pin_without_damping_is_free(damping, seeds):
         limits = fit.confidence_interval()
         assert limits["k_y"][0] < 1e11 < limits["k_y"][1]
         # The beams have 1e3 N m/rad there.
-        assert 0 <= limits["k_theta"][0] < limits["k_theta"][1] < 10
-        held.append(limits["k_theta"][0] == 0)
+        assert -10 < limits["k_theta"][0] < limits["k_theta"][1] < 10
+        held.append(limits["k_theta"][0] <= 0)
     assert any(held)
     assert damping != "none" or limits["k_y"][0] > 1e8
 
@@ -121,7 +119,7 @@ def test_damping_that_is_not_decided_has_the_interval_of_all_kinds():
     b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end").receptance(freq)
     exact = jf.couple(a, b, jf.Joint([2000.0], [3.0]).dynamic_stiffness(freq), [1], [0])[:, 1:3, 1:3]
     fit = jf.identify(freq, jf.pollute(exact, 0.05, seed=1), ["x"])
-    assert any("the data do not decide its terms" in one for one in fit.notes)
+    assert any("[damping-averaged]" in one for one in fit.notes)
     intervals = fit.confidence_interval()
     low, high = intervals["c_x"]
     assert low <= 0 < 3 < high

@@ -12,21 +12,22 @@ FIRST, SMALLEST, LARGEST = 1e-2, 1e-10, 1e8
 GAIN = 1e-5
 
 
-def columns(data, h, m, c, which, factor=None):
-    """Return whitened derivatives of the entries by the unit matrices of H, M or C, shape (n_freq, q, u)."""
-    one, unit = np.eye(data.entries.n), data.entries.units
-    right, left = (one - m @ c)[:, None], (one - c @ m)[:, None]
-    h, m, c = h[:, None], m[:, None], c[:, None]
+def columns(data, h, q, r, which, factor=None):
+    """Return whitened derivatives of the entries by the unit matrices of H, Q or R, shape (n_freq, q, u)."""
+    one, unit, z = np.eye(data.entries.n), data.entries.units, np.diag(data.reference)
+    h, q, r = h[:, None], q[:, None], r[:, None]
+    t, t_left, a, a_left = one - z @ r, one - r @ z, one - q @ r, one - r @ q
+    right, left = t @ a, a_left @ t_left
     if which == "h":
         jj, jk, kj, kk = np.broadcast_to(unit, (len(h), *unit.shape)), unit @ right, left @ unit, left @ unit @ right
-    elif which == "m":
-        uc, cu = unit @ c, c @ unit
-        jk, kj = -h @ uc, -cu @ h
-        jj, kk = np.zeros_like(jk), -cu @ h @ right - left @ h @ uc - c @ uc
     else:
-        mu, um = m @ unit, unit @ m
-        jk, kj = -h @ mu, -um @ h
-        jj, kk = np.zeros_like(jk), -um @ h @ right - left @ h @ mu + unit @ right - c @ mu
+        if which == "q":
+            d_right, d_left, own = -t @ unit @ r, -r @ unit @ t_left, -r @ unit @ r
+        else:
+            d_right, d_left = -z @ unit @ a - t @ q @ unit, -unit @ q @ t_left - a_left @ unit @ z
+            own = unit @ a - r @ q @ unit
+        jk, kj = h @ d_right, d_left @ h
+        jj, kk = np.zeros_like(jk), d_left @ h @ right + left @ h @ d_right + own
     whole = np.concatenate([np.concatenate([jj, jk], -1), np.concatenate([kj, kk], -1)], -2)
     return whitened(data, data.entries.take(whole), factor).swapaxes(1, 2)
 
@@ -41,56 +42,56 @@ def whitened(data, values, factor):
     return np.einsum("lpq,l...q->l...p", factor, weighted)
 
 
-def free_columns(data, h, m, c, factor=None):
-    return np.concatenate([columns(data, h, m, c, which, factor) for which in "hm"], axis=2)
+def free_columns(data, h, q, r, factor=None):
+    return np.concatenate([columns(data, h, q, r, which, factor) for which in "hq"], axis=2)
 
 
-def project(target, data, c, start, steps, factor=None):
+def project(target, data, r, start, steps, factor=None):
     """Levenberg-Marquardt, each line by itself."""
-    found = [_project_line(*line, steps) for line in _line_by_line(target, data, c, start, factor)]
+    found = [_project_line(*line, steps) for line in _line_by_line(target, data, r, start, factor)]
     return OnManifold(*(np.concatenate(x) for x in zip(*found, strict=True)))
 
 
-def _line_by_line(target, data, c, start, factor):
-    for i in range(len(c)):
+def _line_by_line(target, data, r, start, factor):
+    for i in range(len(r)):
         one = slice(i, i + 1)
         own = None if factor is None else factor[one]
-        yield target[one], data.on_lines(np.array([i])), c[one], start.h[one], start.m[one], own
+        yield target[one], data.on_lines(np.array([i])), r[one], start.h[one], start.q[one], own
 
 
-def _project_line(target, data, c, h, m, factor, steps):
+def _project_line(target, data, r, h, q, factor, steps):
     unit = data.entries.units
     u = len(unit)
 
-    def residual(h, m):
-        r = whitened(data, target - data.entries.take(frfs_of_joint(h, m, c)), factor)
-        return r[0], (abs(r) ** 2).sum(axis=1)
+    def residual(h, q):
+        left = whitened(data, target - data.entries.take(frfs_of_joint(h, q, r, data.reference)), factor)
+        return left[0], (abs(left) ** 2).sum(axis=1)
 
-    r, squares = residual(h, m)
+    left, squares = residual(h, q)
     damping = FIRST
     for _ in range(steps):
-        j = free_columns(data, h, m, c, factor)[0]
+        j = free_columns(data, h, q, r, factor)[0]
         size = np.linalg.norm(j, axis=0)
         size = np.where(size > 0, size, 1)
         j = j / size
         normal = j.conj().T @ j + (damping + 1e-12) * np.eye(2 * u)
-        step = np.linalg.solve(normal, j.conj().T @ r) / size
-        there_h, there_m = h + np.tensordot(step[:u], unit, 1), m + np.tensordot(step[u:], unit, 1)
-        there_r, there_squares = residual(there_h, there_m)
+        step = np.linalg.solve(normal, j.conj().T @ left) / size
+        there_h, there_q = h + np.tensordot(step[:u], unit, 1), q + np.tensordot(step[u:], unit, 1)
+        there_left, there_squares = residual(there_h, there_q)
         good, gain = bool(there_squares <= squares), float(squares[0] - there_squares[0])
         if good:
-            h, m, r, squares = there_h, there_m, there_r, there_squares
+            h, q, left, squares = there_h, there_q, there_left, there_squares
         damping = float(np.clip(damping / 6 if good else damping * 8, SMALLEST, LARGEST))
         if good and gain <= GAIN:
             break
-    return OnManifold(h, m, squares)
+    return OnManifold(h, q, squares)
 
 
-def normal_forms(data, c, on, targets, factor=None):
+def normal_forms(data, r, on, targets, factor=None):
     """Return W, p and the squares for each target, shapes (n_freq, u, u), (n_freq, u) and (n_freq,)."""
-    gamma = data.entries.take(frfs_of_joint(on.h, on.m, c))
-    own = columns(data, on.h, on.m, c, "c", factor)
-    free = free_columns(data, on.h, on.m, c, factor)
+    gamma = data.entries.take(frfs_of_joint(on.h, on.q, r, data.reference))
+    own = columns(data, on.h, on.q, r, "r", factor)
+    free = free_columns(data, on.h, on.q, r, factor)
     size = np.linalg.norm(free, axis=1, keepdims=True)
     vectors, values, _ = np.linalg.svd(free / np.where(size > 0, size, 1), full_matrices=False)
     basis = vectors * (values > 1e-12 * values[:, :1])[:, None]
@@ -99,7 +100,7 @@ def normal_forms(data, c, on, targets, factor=None):
     own_adjoint = own.conj().swapaxes(1, 2)
     forms = []
     for target in targets:
-        r = whitened(data, target - gamma, factor)[..., None]
-        r = r - basis @ (adjoint @ r)
-        forms.append((own_adjoint @ own, (own_adjoint @ r)[..., 0], (abs(r[..., 0]) ** 2).sum(axis=1)))
+        left = whitened(data, target - gamma, factor)[..., None]
+        left = left - basis @ (adjoint @ left)
+        forms.append((own_adjoint @ own, (own_adjoint @ left)[..., 0], (abs(left[..., 0]) ** 2).sum(axis=1)))
     return forms

@@ -11,7 +11,6 @@ on_manifold     FRFs that fit a joint: projection, forms, expected M of a stiff 
 starts          first coordinates from the compliance of single lines
 group_fit       the iteration: linearise, minimise, judge
 unknown_cross   the fit where cross terms of C are unknown
-soft            the fit of DOFs that may be free, in their stiffness
 estimate        strategies tried in order for every group of DOFs, put together
 beyond_noise    errors of models of the sides, parts of the band that disagree, channels a little off
 uncertainty     scatter between lines and parts of the band, intervals, test of the residual

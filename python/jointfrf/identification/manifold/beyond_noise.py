@@ -73,7 +73,8 @@ def side_spread(found: JointEstimate, frfs: InterfaceFrfs, compliance: FloatArra
             of_compliance = group.joint.is_compliance
             if of_compliance.any():
                 # Whatever the damping takes up of it.
-                softer[:, of_compliance] = np.diag(compliance[group.dofs])[:, of_compliance[: len(group.dofs)]]
+                own = np.diag(compliance[group.dofs])[:, of_compliance[: len(group.dofs)]]
+                softer[:, of_compliance] = own / group.joint.compliance_slope(group.x)[of_compliance]
             changes.append(softer)
         std_error[group.which], factor[group.which] = _spread(group, np.concatenate(changes), inverse / 2)
     return SideSpread(std_error, factor)
@@ -90,16 +91,19 @@ def _spread(group: GroupFit, changes: FloatArray, noise: FloatArray) -> tuple[Fl
     (of_coordinate, of_coordinates), (of_parameter, ratio) = found
     # A rigid DOF has no finite slope.
     ratio = np.where(np.isfinite(ratio), ratio, of_coordinates)
+    of_coordinate = of_coordinate * group.joint.compliance_slope(group.x)
     return np.where(group.joint.is_compliance, of_coordinate, of_parameter), np.nan_to_num(ratio)
 
 
 def _softer(group: GroupFit, compliance: FloatArray) -> FloatArray:
     """Return by how much the gradient changes when the compliance of each DOF is larger, shape (n, p)."""
     joint, forms = group.joint, group.forms
-    adjoint = joint.slope(group.x, joint.compliance(group.x)).conj()
-    own = (joint.rows == joint.columns) & (joint.rows == np.arange(joint.n)[:, None])
-    change = own * compliance[:, None]
-    weighted = np.einsum("lqr,dr->ldq", forms.weight, change)
+    entries = joint.compliance(group.x)
+    adjoint = joint.slope(group.x, entries).conj()
+    # dR = (1 - R Z) dC (1 - Z R)
+    kept = np.eye(joint.n) - joint.matrix(entries) * joint.springs
+    change = np.einsum("lad,d,lbd->ldab", kept, compliance, kept)[:, :, joint.rows, joint.columns]
+    weighted = np.einsum("lqr,ldr->ldq", forms.weight, change)
     found: FloatArray = np.einsum("lqp,ldq->dp", adjoint, weighted).real
     return found
 

@@ -1,8 +1,9 @@
 """K*(w) of a joint, and its compliance as a function of coordinates in which a fit is well behaved.
 
-A joint of springs without cross terms is fitted in the compliance a = 1/k and the rates eta = h/k and tau = c/k of each
-DOF: regular for a rigid DOF, a = 0, where k runs to infinity. One with cross terms is fitted in the entries of K*, one
-of laws in their parameters.
+Everything is a function of R = (K* + Z)^-1, the compliance of the joint in parallel with reference springs Z. A joint
+without cross terms is fitted in a = 1/(k + z) and the rates eta = h a and tau = c a of each DOF, which are regular for
+a rigid DOF, a = 0, and for a free one, a = 1/z. One with cross terms is fitted in the entries of K*, one of laws in
+their parameters.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from jointfrf.identification.minimise import inverse_information
 from jointfrf.identification.parameters import ParameterVector, joint_vector
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.kernel.call import call, call_for_number
-from jointfrf.kernel.linear_algebra import invert
+from jointfrf.kernel.linear_algebra import invert, solve
 from jointfrf.laws.law_joint import LawJoint
 
 __all__ = [
@@ -188,30 +189,33 @@ class SpringJoint(JointCoordinates):
     Parameters
     ----------
     terms : JointTerms
+    springs : ndarray, shape (n,), optional
+        Reference springs Z, N/m or N m/rad; none by default.
     """
 
-    def __init__(self, terms: JointTerms) -> None:
+    def __init__(self, terms: JointTerms, springs: FloatArray | None = None) -> None:
         self.terms, self.parameters, self.omega, self.n = terms, terms.parameters, terms.omega, terms.n
+        self.springs = np.zeros(terms.n) if springs is None else springs
         first = terms.first
         self.dofs = terms.pairs[first, 0]
         self.is_stiffness = (terms.kinds[first] == 0) & (terms.pairs[first, 0] == terms.pairs[first, 1])
 
     def on_lines(self, lines: slice | NDArray[np.intp]) -> SpringJoint:
         """Return the same on some of the lines."""
-        return type(self)(self.terms.on_lines(lines))
+        return type(self)(self.terms.on_lines(lines), self.springs)
 
 
 class DiagonalJoint(SpringJoint):
-    """A joint without cross terms: C_dd = a_d / (1 + i eta_d + i w tau_d); entries of C are its diagonal.
+    """A joint without cross terms: R_dd = a_d / (1 + i eta_d + i w tau_d); entries of R are its diagonal.
 
-    With `by_rate` false the coordinates of damping are h and c themselves, C_dd = a_d / (1 + i a_d h_d + i w a_d
+    With `by_rate` false the coordinates of damping are h and c themselves, R_dd = a_d / (1 + i a_d h_d + i w a_d
     c_d): for the profile of their likelihood.
     """
 
     in_compliance = True
 
-    def __init__(self, terms: JointTerms, *, by_rate: bool = True) -> None:
-        super().__init__(terms)
+    def __init__(self, terms: JointTerms, springs: FloatArray | None = None, *, by_rate: bool = True) -> None:
+        super().__init__(terms, springs)
         self.by_rate = by_rate
         self.rows, self.columns = np.diag_indices(terms.n)
         self.rates = np.flatnonzero(terms.kinds > 0)
@@ -232,7 +236,7 @@ class DiagonalJoint(SpringJoint):
         return 1 / whole
 
     def compliance(self, x: FloatArray) -> ComplexArray:
-        """Return the diagonal of C, shape (n_freq, n)."""
+        """Return the diagonal of R, shape (n_freq, n)."""
         diagonal: ComplexArray = x[: self.terms.n] * self._turn(x)
         return diagonal
 
@@ -250,19 +254,20 @@ class DiagonalJoint(SpringJoint):
 
     def on_lines(self, lines: slice | NDArray[np.intp]) -> DiagonalJoint:
         """Return the same on some of the lines."""
-        return DiagonalJoint(self.terms.on_lines(lines), by_rate=self.by_rate)
+        return DiagonalJoint(self.terms.on_lines(lines), self.springs, by_rate=self.by_rate)
 
     def theta(self, x: FloatArray) -> FloatArray:
-        """Return k = 1/a, h = eta/a, c = tau/a; infinite for a rigid DOF."""
+        """Return k = 1/a - z, h = eta/a, c = tau/a; infinite for a rigid DOF."""
         with np.errstate(divide="ignore", invalid="ignore"):
             theta: FloatArray = np.where(self.terms.kinds > 0, x, 1.0) / x[self.dofs]
+        theta[self.is_stiffness] -= self.springs
         if not self.by_rate:
             theta[self.rates] = x[self.rates]
         return theta
 
     def coordinates(self, theta: FloatArray) -> FloatArray:
         """Return a, eta and tau, inside their limits."""
-        k = theta[self.dofs]
+        k = theta[self.dofs] + self.springs[self.dofs]
         x = np.divide(np.where(self.terms.kinds > 0, theta, 1.0), k, out=np.zeros_like(k), where=np.isfinite(k))
         if not self.by_rate:
             x = np.where(self.terms.kinds > 0, theta, x)
@@ -364,7 +369,9 @@ class DiagonalJoint(SpringJoint):
 
     def of_profile(self, i: int) -> DiagonalJoint:
         """Return the coordinates of a profile: damping itself where its own is asked for."""
-        return self if self.is_stiffness[i] == self.by_rate else DiagonalJoint(self.terms, by_rate=not self.by_rate)
+        if self.is_stiffness[i] == self.by_rate:
+            return self
+        return DiagonalJoint(self.terms, self.springs, by_rate=not self.by_rate)
 
     def end(self, i: int, sign: int) -> float:
         """Return what a parameter runs to: a stiffness is infinite where its compliance may be zero."""
@@ -372,14 +379,14 @@ class DiagonalJoint(SpringJoint):
 
 
 class CoupledJoint(SpringJoint):
-    """A joint with cross terms or equal points: coordinates are the parameters, entries the upper triangle of C."""
+    """A joint with cross terms or equal points: coordinates are the parameters, entries the upper triangle of R."""
 
-    def __init__(self, terms: JointTerms) -> None:
-        super().__init__(terms)
+    def __init__(self, terms: JointTerms, springs: FloatArray | None = None) -> None:
+        super().__init__(terms, springs)
         self.rows, self.columns = np.triu_indices(terms.n)
         self.pairs, place = np.unique(terms.pairs, axis=0, return_inverse=True)
         self.pair_of = place.ravel()
-        # Places of C in (C E C)_rc = C_ra C_cb + C_rb C_ca of the upper triangle by pairs a, b; once where a = b.
+        # Places of R in (R E R)_rc = R_ra R_cb + R_rb R_ca of the upper triangle by pairs a, b; once where a = b.
         n, r, c = terms.n, self.rows[:, None], self.columns[:, None]
         a, b = self.pairs.T
         self._left, self._right = r * n + a, c * n + b
@@ -390,11 +397,11 @@ class CoupledJoint(SpringJoint):
         self.upper = -self.lower
 
     def compliance(self, x: FloatArray) -> ComplexArray:
-        """Return the upper triangle of C, shape (n_freq, n (n + 1)/2); NaN where K* is singular."""
-        return invert(self.terms.stiffness(x), on_singular="nan")[:, self.rows, self.columns]
+        """Return the upper triangle of R, shape (n_freq, n (n + 1)/2); NaN where K* + Z is singular."""
+        return invert(self.terms.stiffness(x) + np.diag(self.springs), on_singular="nan")[:, self.rows, self.columns]
 
     def _by_pair(self, entries: ComplexArray) -> ComplexArray:
-        """Return C E C of each pair of DOFs, upper triangle, shape (n_freq, n (n + 1)/2, m)."""
+        """Return R E R of each pair of DOFs, upper triangle, shape (n_freq, n (n + 1)/2, m)."""
         flat = self.matrix(entries).reshape(len(entries), -1)
         by_pair: ComplexArray = flat.take(self._left, axis=1)
         by_pair *= flat.take(self._right, axis=1)
@@ -404,7 +411,7 @@ class CoupledJoint(SpringJoint):
         return by_pair
 
     def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
-        """Return the derivatives of the upper triangle, -C E C, shape (n_freq, n (n + 1)/2, p)."""
+        """Return the derivatives of the upper triangle, -R E R, shape (n_freq, n (n + 1)/2, p)."""
         slope: ComplexArray = self._by_pair(entries)[:, :, self.pair_of]
         slope *= -self.terms.factors[self.terms.kinds].T[:, None, :]
         return summed_terms(slope, self.terms.shared)
@@ -443,7 +450,7 @@ def _of_triangle(
     residual: ComplexArray,
     shared: NDArray[np.intp],
 ) -> tuple[FloatArray, FloatArray]:
-    """Return Re(J^H W J) and Re(J^H r) of all lines, J = -f C E C of the upper triangle of C.
+    """Return Re(J^H W J) and Re(J^H r) of all lines, J = -f R E R of the upper triangle of R.
 
     Parameters
     ----------
@@ -464,9 +471,9 @@ def _of_triangle(
     return summed_terms(summed_terms(normal, shared).T, shared), summed_terms(descent, shared)
 
 
-def coordinates_of(terms: JointTerms) -> SpringJoint:
-    """Return the coordinates in which a joint of springs is fitted."""
-    return CoupledJoint(terms) if terms.has_cross_terms or terms.is_shared else DiagonalJoint(terms)
+def coordinates_of(terms: JointTerms, springs: FloatArray | None = None) -> SpringJoint:
+    """Return the coordinates in which a joint of springs is fitted, with reference springs."""
+    return (CoupledJoint if terms.has_cross_terms or terms.is_shared else DiagonalJoint)(terms, springs)
 
 
 class LawCoordinates(JointCoordinates):
@@ -482,16 +489,24 @@ class LawCoordinates(JointCoordinates):
         Dynamic stiffness of the structure at the joint DOFs: stiffnesses are sought around it.
     shared : ndarray of int, shape (q,), optional
         The parameter that each of `joint` is, of points whose joints are equal; each its own by default.
+    springs : ndarray, shape (n,), optional
+        Reference springs Z, N/m or N m/rad; none by default.
 
     Notes
     -----
-    Entries are the upper triangle of C. Stiffnesses and times that cannot be negative are sought as logarithms.
+    Entries are the upper triangle of R. Stiffnesses and times that cannot be negative are sought as logarithms.
     """
 
     def __init__(
-        self, joint: LawJoint, omega: FloatArray, size: FloatArray, shared: NDArray[np.intp] | None = None
+        self,
+        joint: LawJoint,
+        omega: FloatArray,
+        size: FloatArray,
+        shared: NDArray[np.intp] | None = None,
+        springs: FloatArray | None = None,
     ) -> None:
         self.joint, self.omega, self.size, self.n = joint, omega, size, len(joint.dofs)
+        self.springs = np.zeros(self.n) if springs is None else springs
         self.shared = np.arange(len(joint.quantities)) if shared is None else shared
         first = np.unique(self.shared, return_index=True)[1].tolist()
         self.parameters = tuple(joint.quantities[i] for i in first)
@@ -509,12 +524,14 @@ class LawCoordinates(JointCoordinates):
         return np.asarray(np.bincount(self.shared, values) / np.bincount(self.shared))
 
     def compliance(self, x: FloatArray) -> ComplexArray:
-        """Return the upper triangle of C, shape (n_freq, n (n + 1)/2); NaN where K* is singular."""
+        """Return the upper triangle of R = (1 + C Z)^-1 C, shape (n_freq, n (n + 1)/2); NaN where K* is singular."""
         c = self._at(x).compliance(self.omega / (2 * np.pi), on_singular="nan")
+        if self.springs.any():
+            c = solve(np.eye(self.n) + c * self.springs, c, on_singular="nan")
         return np.ascontiguousarray(c[:, self.rows, self.columns])
 
     def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
-        """Return its derivatives by the coordinates, -C dK C, shape (n_freq, n (n + 1)/2, p)."""
+        """Return its derivatives by the coordinates, -R dK R, shape (n_freq, n (n + 1)/2, p)."""
         c = self.matrix(entries)
         slope = np.zeros((*entries.shape, x.size), np.complex128)
         for i, (places, by_value) in zip(self.shared, self._at(x).connection_slopes(self.omega), strict=True):
@@ -535,7 +552,7 @@ class LawCoordinates(JointCoordinates):
 
     def on_lines(self, lines: slice | NDArray[np.intp]) -> LawCoordinates:
         """Return the same on some of the lines."""
-        return LawCoordinates(self.joint, self.omega[lines], self.size, self.shared)
+        return LawCoordinates(self.joint, self.omega[lines], self.size, self.shared, self.springs)
 
     def theta(self, x: FloatArray) -> FloatArray:
         """Return the parameters."""

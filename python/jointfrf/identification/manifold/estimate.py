@@ -26,7 +26,6 @@ from jointfrf.identification.manifold.group_fit import LITTLE_PATIENCE, GroupFit
 from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold.line_forms import FormMinimum, NamedParameter
 from jointfrf.identification.manifold.on_manifold import LineData, OnManifold
-from jointfrf.identification.manifold.soft import SoftJoint, fit_soft, soft_dofs
 from jointfrf.identification.manifold.starts import first_joints
 from jointfrf.identification.manifold.unknown_cross import fit_unknown_cross
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
@@ -54,17 +53,21 @@ class GroupStart(NamedTuple):
         Coordinates of the joint.
     on : OnManifold, optional
         FRFs that nearly fit it.
+    springs : ndarray, shape (n,), optional
+        Reference springs to which x and Q belong.
     """
 
     dofs: NDArray[np.intp]
     parameters: tuple[NamedParameter, ...]
     x: FloatArray
     on: OnManifold | None
+    springs: FloatArray | None
 
     @classmethod
     def of(cls, group: GroupFit, minimum: FormMinimum) -> GroupStart:
         """Return the start at a minimum of the quadratic forms of a fit."""
-        return cls(group.dofs, tuple(minimum.joint.parameters), minimum.x, group.on)
+        springs = group.problem.data.springs
+        return cls(group.dofs, tuple(minimum.joint.parameters), minimum.x, group.on, springs)
 
 
 class JointEstimate(NamedTuple):
@@ -110,12 +113,8 @@ class JointEstimate(NamedTuple):
 
     @property
     def starts(self) -> tuple[GroupStart, ...]:
-        """Where fits of other FRFs of the same structure begin; not of those unconverged or with free DOFs."""
-        return tuple(
-            GroupStart.of(group, group)
-            for group in self.groups
-            if group.converged and not isinstance(group.joint, SoftJoint)
-        )
+        """Where fits of other FRFs of the same structure begin; not of those unconverged."""
+        return tuple(GroupStart.of(group, group) for group in self.groups if group.converged)
 
 
 def estimate_joint(
@@ -155,43 +154,18 @@ def estimate_joint(
     for dofs, lines in _grouped(frfs) if data is None else data:
         own, which = terms.of_dofs(dofs)
         _count_fitted(fitted, which, names)
-        joint = coordinates_of(own)
         unknown = _unknown_entries(dofs, cross, used, len(lines.measured))
-        problem = GroupProblem(dofs, which, lines, joint, unknown, sides_bend=sides_bend)
-        # Some lines, evenly spread, start as well as all.
-        some = spread_lines(len(lines.measured))
-
-        def starts(lines: LineData = lines, terms: JointTerms = own, some: slice = some) -> list[FloatArray]:
-            return first_joints(lines.on_lines(some), coordinates_of(terms.on_lines(some)))
-
         start = known.get((tuple(dofs.tolist()), own.parameters))
-        found = _fitted(_Search(problem, starts, cross, start, is_explained))
-        if isinstance(found.joint, DiagonalJoint) and not problem.unknown.any() and not is_explained:
-            found = _with_free_dofs(found, problem, own, frfs)
-        groups.append(found)
+        plain = lines._replace(springs=None)
+        # Unknown entries are entries of C, which is R without springs. Cross terms of T = 1 - Z R would make the
+        # columns by Q nearly dependent, and projections slow.
+        has_springs = not (own.has_cross_terms or unknown.any())
+        lines = plain.with_springs() if has_springs else plain
+        if start is not None:
+            lines = plain._replace(springs=start.springs)
+        problem = GroupProblem(dofs, which, lines, coordinates_of(own, lines.springs), unknown, sides_bend=sides_bend)
+        groups.append(_fitted(_Search(problem, own, cross, start, is_explained)))
     return assembled(terms.parameters, groups)
-
-
-def _with_free_dofs(found: GroupFit, problem: GroupProblem, terms: JointTerms, frfs: InterfaceFrfs) -> GroupFit:
-    """Fit again where DOFs may be free."""
-    soft = soft_dofs(found)
-    if not soft.any():
-        return found
-
-    def rest(kept: NDArray[np.bool_]) -> FloatArray | None:
-        if not kept.any():
-            return None
-        data = frfs.of_dofs(found.dofs[kept])
-        some = spread_lines(len(data.measured))
-        own, which = terms.of_dofs(np.flatnonzero(kept))
-        joint = coordinates_of(own)
-        theta = np.zeros(len(terms.parameters))
-        for x in first_joints(data.on_lines(some), coordinates_of(own.on_lines(some))):
-            theta[which] = np.nan_to_num(joint.theta(x), posinf=0.0, neginf=0.0)
-            return theta
-        return None
-
-    return fit_soft(found, problem, terms, soft, rest)
 
 
 def estimate_laws(
@@ -229,9 +203,11 @@ def estimate_laws(
         driving = abs(np.einsum("lpp->lp", gamma))
         # 1/(|gamma_jj| + |gamma_kk|) is a size of stiffness that FRFs can show.
         size = np.median(1 / np.maximum(driving[:, : dofs.size] + driving[:, dofs.size :], 1e-300), axis=0)
+        if all(a == b for a, b in own.laws):
+            lines = lines.with_springs()
         which, of_own = np.unique(shared[[names.index(name) for name in own.names]], return_inverse=True)
         _count_fitted(fitted, which, [one.name for one in quantities])
-        coordinates = LawCoordinates(own, omega, size, of_own.ravel())
+        coordinates = LawCoordinates(own, omega, size, of_own.ravel(), lines.springs)
         rigid = len(own.rigid)
         problem = GroupProblem(
             dofs, which, lines, coordinates,
@@ -241,8 +217,8 @@ def estimate_laws(
         both = list(range(2 * dofs.size))
         values = from_lines(own, omega, interface_compliance(gamma, variance, (both, both)))
         given = [*_near_springs(own, lines, omega), *([] if values is None else [values]), own.values]
-        starts = [coordinates.coordinates(coordinates.common(one)) for one in given]
-        groups.append(_fitted(_Search(problem, lambda starts=starts: starts, "zero")))  # type: ignore[misc]
+        starts = tuple(coordinates.coordinates(coordinates.common(one)) for one in given)
+        groups.append(_fitted(_Search(problem, None, "zero", given=starts)))
     if left:
         a, b = next(iter(left))
         raise ValueError(f"the FRFs between {a} and {b} are zero: they say nothing of the cross term {a},{b}")
@@ -261,9 +237,8 @@ def _near_springs(joint: LawJoint, lines: LineData, omega: FloatArray) -> list[F
     parameters = tuple(Parameter(kind, a, b) for kind in get_args(ParameterKind) for a, b in joint.laws)
     kinds, number = np.repeat(np.arange(3), len(pairs)), np.arange(3 * len(pairs))
     terms = JointTerms(parameters, omega, kinds, np.array(pairs * 3, np.intp), number)
-    some = spread_lines(len(lines.measured))
     found = []
-    for x in first_joints(lines.on_lines(some), coordinates_of(terms.on_lines(some))):
+    for x in _starts_of_lines(lines._replace(springs=None), terms):
         k = terms.stiffness(x)
         laws = [law.started(omega, k[:, a, b]) for law, (a, b) in zip(joint.laws.values(), pairs, strict=True)]
         found.append(np.concatenate([law.values for law in laws]))
@@ -300,8 +275,8 @@ class _Search:
     Attributes
     ----------
     problem : GroupProblem
-    starts_of_lines : callable
-        Returns coordinates of the joint from the compliance of single lines, the likeliest first.
+    terms : JointTerms or None
+        Of springs; None of laws, whose starts are given.
     cross : {"zero", "ignore", "points", "fit"}
     near : GroupStart, optional
         What a fit to other FRFs of the same structure, or with other terms, has found.
@@ -310,33 +285,39 @@ class _Search:
     """
 
     problem: GroupProblem
-    starts_of_lines: Callable[[], list[FloatArray]]
+    terms: JointTerms | None
     cross: CrossTerms
     near: GroupStart | None = None
     is_explained: bool = False
+    given: tuple[FloatArray, ...] = ()
 
     @cached_property
     def starts(self) -> list[FloatArray]:
-        """Coordinates from the compliance of single lines."""
-        return self.starts_of_lines()
+        """Coordinates from the compliance of single lines, the likeliest first, or those given."""
+        return list(self.given) if self.terms is None else _starts_of_lines(self.problem.data, self.terms)
 
     @cached_property
     def diagonal(self) -> GroupFit:
         """The fit to the diagonal of C, whatever its cross terms are."""
-        return fit_unknown_cross(self.problem, self.starts)
+        assert self.terms is not None
+        data = self.problem.data._replace(springs=None)
+        plain = self.problem._replace(data=data, joint=coordinates_of(self.terms))
+        return fit_unknown_cross(plain, _starts_of_lines(data, self.terms))
 
     @cached_property
     def on_manifold(self) -> GroupFit:
-        """The fit without cross terms, from the diagonal of C, and where that is not good enough from the lines."""
-        found = fit_dofs(self.problem, [self.diagonal.x], LITTLE_PATIENCE)
-        # Where the diagonal of C fits far better, other starts do not help: cross terms are not zero.
-        if (
-            found.is_good
-            or self.problem.sides_bend
-            or (found.is_lost and found.excess > _FAR_BETTER * self.diagonal.excess)
-        ):
+        """The fit without cross terms, from single lines, and if that is lost from the diagonal of C."""
+        found = fit_dofs(self.problem, self.starts)
+        if not found.is_lost:
             return found
-        return min(found, fit_dofs(self.problem, self.starts), key=lambda one: one.squares)
+        start = self.problem.joint.coordinates(self.diagonal.joint.theta(self.diagonal.x))
+        return min(found, fit_dofs(self.problem, [start], LITTLE_PATIENCE), key=lambda one: one.squares)
+
+
+def _starts_of_lines(data: LineData, terms: JointTerms) -> list[FloatArray]:
+    """Return coordinates of the joint from the compliance of some lines, evenly spread, which start as well as all."""
+    some = spread_lines(len(data.measured))
+    return first_joints(data.on_lines(some), coordinates_of(terms.on_lines(some), data.springs))
 
 
 def _from_another_fit(search: _Search) -> GroupFit | None:
@@ -366,7 +347,7 @@ def _from_diagonal(problem: GroupProblem, joint: CoupledJoint) -> list[GroupFit]
     it has. A joint without cross terms is stable there, if far from the data: it is near enough to start from.
     """
     terms, common = joint.terms.without_cross_terms()
-    simple = DiagonalJoint(terms)
+    simple = DiagonalJoint(terms, problem.data.springs)
     some = spread_lines(len(problem.data.measured))
     starts = first_joints(problem.data.on_lines(some), simple.on_lines(some))
     ends = starts[:1]

@@ -41,7 +41,6 @@ from jointfrf.identification.manifold.flexible_sides import JointAlone, SideBend
 from jointfrf.identification.manifold.group_fit import GroupFit
 from jointfrf.identification.manifold.line_forms import LEAST_GAIN, FormMinimum
 from jointfrf.identification.manifold.prepare import FitProblem, check_estimate
-from jointfrf.identification.manifold.soft import SoftJoint
 from jointfrf.identification.manifold.uncertainty import joint_intervals, residual_test_of, spread_of
 from jointfrf.identification.manifold.unknown_cross import compliance_lines
 from jointfrf.identification.profile import Intervals
@@ -232,16 +231,21 @@ def _fitted_compliance(group: GroupFit, factors: Sequence[FloatArray]) -> FloatA
     joint, n = group.joint, len(group.dofs)
     if joint.in_compliance:
         stiff = joint.is_compliance
-        value, own = group.x[stiff], np.diagonal(group.covariance)[stiff]
+        value = 1 / joint.theta(group.x)[stiff]
+        own = (np.diagonal(group.covariance) * joint.compliance_slope(group.x) ** 2)[stiff]
         variances = [own * factor[stiff] for factor in factors]
     else:
         diagonal = np.flatnonzero(joint.rows == joint.columns)
         entries = joint.compliance(group.x)
         slope = joint.slope(group.x, entries)[:, diagonal].real.mean(axis=0)[:n]
-        # The real part of K* is that of all lines, the real part of C is not: damping takes from it.
-        stiffness = np.linalg.inv(joint.matrix(entries)).real.mean(axis=0)
-        value = np.diagonal(np.linalg.inv(stiffness))[:n]
-        roots = [slope * np.sqrt(factor) for factor in factors]
+        # The real part of K* is the same on all lines, the real part of C is not: damping changes it.
+        springs = np.diag(joint.springs)
+        stiffness = (np.linalg.inv(joint.matrix(entries)) - springs).real.mean(axis=0)
+        compliance = np.linalg.inv(stiffness)
+        value = np.diagonal(compliance)[:n]
+        # dC = (1 + C Z) dR (1 + Z C)
+        more = np.diagonal(np.eye(n) + compliance @ springs) ** 2
+        roots = [slope * more[:, None] * np.sqrt(factor) for factor in factors]
         variances = [np.einsum("dp,pq,dq->d", root, group.covariance, root) for root in roots]
     return np.array([value, *np.sqrt(np.maximum(variances, 0))])
 
@@ -504,7 +508,7 @@ def _starts(
     return tuple(
         GroupStart.of(group, _minimum(group, terms.of_dofs(group.dofs)[0]))
         for group in found.groups
-        if (group.converged or group.is_noise) and not isinstance(group.joint, SoftJoint)
+        if (group.converged or group.is_noise)
     )
 
 
@@ -571,9 +575,7 @@ def _minimum(
 ) -> FormMinimum:
     """Minimise the forms of a group with other terms, from the joint found; terms that it has not begin at zero."""
     terms = terms.on_lines(lines)
-    joint = coordinates_of(terms)
-    if isinstance(group.joint, SoftJoint):
-        joint = SoftJoint(terms, group.joint.soft, group.joint.size)
+    joint = coordinates_of(terms, group.problem.data.reference)
     found = dict(zip(group.joint.names, group.joint.theta(group.x).tolist(), strict=True))
     theta = np.array([found.get(one.name, 0.0) for one in terms.parameters])
     return joint.minimise(group.forms.on_slice(lines), joint.coordinates(theta), least_gain=least_gain)

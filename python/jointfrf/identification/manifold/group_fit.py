@@ -75,8 +75,6 @@ _FEW_STARTS = 2
 _AT_ONCE = 8
 #: Entries of changed FRFs held at once where more changes than that are: 64 MB.
 _MOST_ENTRIES = 2**22
-#: Factors by which poorly determined DOFs are made softer: at first, and where that led nowhere.
-_SOFTER, _SOFTER_STILL = 3.0, 4.0
 
 
 class GroupProblem(NamedTuple):
@@ -230,8 +228,7 @@ def fit_dofs(
 ) -> GroupFit:
     """Fit from one start after the other until the residual is that of the noise; else keep the lowest.
 
-    A fit may go to and fro without end at a residual that is noise; where two starts lead there, others do, too. Where
-    none leads to noise, poorly determined DOFs are made softer.
+    A fit may go to and fro without end at a residual that is noise; where two starts lead there, others do, too.
 
     Parameters
     ----------
@@ -258,8 +255,7 @@ def fit_dofs(
             break
     if best is None:
         raise np.linalg.LinAlgError("no start of the fit stays finite")
-    is_last = best.is_noise or best.is_lost or problem.sides_bend or not problem.joint.in_compliance
-    return best if is_last else _from_softer(best)
+    return best
 
 
 def gradients_of(fit: GroupFit, changes: Iterable[ComplexArray]) -> FloatArray:
@@ -318,9 +314,9 @@ def effects_of(
         c = np.where(unknown, smooth_compliance(own), c)
     # Where cross terms are unknown there is no point of the manifold.
     on = fit.on if fit.on is not None and not unknown.any() else None
-    point = _first_points(own, c) if on is None else OnManifold(on.h[lines], on.m[lines], on.squares[lines])
+    point = _first_points(own, c) if on is None else OnManifold(on.h[lines], on.q[lines], on.squares[lines])
     point = _rescued(own, c, point)
-    fitted = own.entries.take(frfs_of_joint(point.h, point.m, c))
+    fitted = own.entries.take(frfs_of_joint(point.h, point.q, c, own.reference))
     here, more = problem._replace(data=own, unknown=problem.unknown[lines]), iter(changes)
     # A form is factorised once for all changes of a call.
     at_once = max(_AT_ONCE, _MOST_ENTRIES // max(fitted.size, 1))
@@ -342,28 +338,6 @@ def _gradients_beside(fit: GroupFit, changes: Iterable[ComplexArray]) -> FloatAr
         weighted = np.einsum("lqr,lr->lq", fit.forms.weight[:, :n, :n], np.nan_to_num(moved))
         found.append(np.einsum("lqp,lq->p", adjoint[:, :n], weighted).real)
     return np.array(found).reshape(-1, fit.x.size)
-
-
-def _from_softer(best: GroupFit) -> GroupFit:
-    """Start again from softer values of poorly determined DOFs: far too stiff, a fit may be caught.
-
-    From a few times the compliance that the data can resolve, up to that of the structure around the joint.
-    """
-    joint, softest = best.joint, best.problem.data.own_size
-    n, of_rate = joint.n, joint.dofs[joint.n :]
-    factor = _SOFTER
-    while not best.is_noise:
-        a = best.x[:n]
-        error = np.sqrt(np.diagonal(best.covariance)[:n])
-        softer = factor * np.maximum(a, error)
-        poorly = (error > _POORLY * a) & (softer < softest)
-        if not poorly.any():
-            break
-        # A rate that belongs to another compliance says nothing here.
-        start = np.r_[np.where(poorly, softer, a), np.where(poorly[of_rate], 0.0, best.x[n:])]
-        found = _iterated(best.problem, start)
-        best, factor = (found, _SOFTER) if found.squares < best.squares else (best, _SOFTER_STILL * factor)
-    return best
 
 
 def _iterated(
@@ -505,7 +479,7 @@ def _linearised(
 
     def of_lines(own: slice) -> Sequence[NDArray[Any]]:
         here = problem._replace(data=problem.data.on_lines(own), unknown=problem.unknown[own])
-        point = OnManifold(on.h[own], on.m[own], on.squares[own])
+        point = OnManifold(on.h[own], on.q[own], on.squares[own])
         if prior is not None:
             point = expected_m(here.data, c[own], point, prior.on_lines(own))
         targets = (here.data.measured, here.data.smooth) if here.unknown.any() else (here.data.measured,)
@@ -533,10 +507,10 @@ def _rescued(data: LineData, c: ComplexArray, on: OnManifold) -> OnManifold:
         return on
     other = starts_on_manifold(data.on_lines(far), c[far], _OTHER_STEPS)
     squares = on.squares.copy()
-    h, m = on.h.copy(), on.m.copy()
+    h, q = on.h.copy(), on.q.copy()
     nearer = other.squares < squares[far]
-    h[far[nearer]], m[far[nearer]], squares[far[nearer]] = (x[nearer] for x in other)
-    return OnManifold(h, m, squares)
+    h[far[nearer]], q[far[nearer]], squares[far[nearer]] = (x[nearer] for x in other)
+    return OnManifold(h, q, squares)
 
 
 def _of_coordinates(problem: GroupProblem, several: Sequence[LineForms]) -> tuple[list[LineForms], ComplexArray | None]:

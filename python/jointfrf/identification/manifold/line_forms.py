@@ -178,7 +178,7 @@ class NamedParameter(Protocol):
 
 
 class JointCoordinates(ABC):
-    """The compliance C = K*^-1 of a joint as a function of coordinates x of length p, one for each parameter.
+    """R = (K* + Z)^-1 of a joint as a function of coordinates x of length p, one for each parameter.
 
     Attributes
     ----------
@@ -189,7 +189,7 @@ class JointCoordinates(ABC):
     n : int
         Joint DOFs.
     rows, columns : ndarray of int, shape (q,)
-        Entries of C that the coordinates change, on and above its diagonal.
+        Entries of R that the coordinates change, on and above its diagonal.
     lower, upper : ndarray, shape (p,)
         Smallest and largest value of each coordinate.
     dofs : ndarray of int, shape (p,)
@@ -197,10 +197,12 @@ class JointCoordinates(ABC):
     is_stiffness : ndarray of bool, shape (p,)
         Parameters that are the stiffness of one DOF.
     in_compliance : bool
-        Whether the coordinates of stiffnesses are compliances, 0 for a rigid DOF, and those of damping their rates: the
-        n compliances first.
+        Whether the coordinates of stiffnesses are compliances a = 1/(k + z), 0 for a rigid DOF, and the coordinates of
+        damping their rates: the n compliances first.
     rate_of_one : ndarray
         Rates at which damping is as large as stiffness on the highest line; of those coordinates only.
+    springs : ndarray, shape (n,)
+        Reference springs Z, N/m or N m/rad.
     """
 
     parameters: Sequence[NamedParameter]
@@ -214,6 +216,7 @@ class JointCoordinates(ABC):
     is_stiffness: NDArray[np.bool_]
     in_compliance = False
     rate_of_one: FloatArray = np.zeros(0)
+    springs: FloatArray = np.zeros(0)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -225,6 +228,12 @@ class JointCoordinates(ABC):
         """Which coordinates are compliances, shape (p,)."""
         return self.is_stiffness & self.in_compliance
 
+    def compliance_slope(self, x: FloatArray) -> FloatArray:
+        """Return the derivatives of 1/k by the coordinates a = 1/(k + z) of stiffnesses, 1 elsewhere, shape (p,)."""
+        slope, of = np.ones(x.size), self.is_compliance
+        slope[of] = 1 / np.maximum((1 - self.springs[self.dofs[of]] * x[of]) ** 2, np.finfo(float).tiny)
+        return slope
+
     def may_be_rigid(self, i: int) -> bool:
         """Whether a parameter is of a DOF whose coordinate is its compliance."""
         return False
@@ -235,7 +244,7 @@ class JointCoordinates(ABC):
 
     @abstractmethod
     def compliance(self, x: FloatArray) -> ComplexArray:
-        """Return the entries of C that the coordinates change, shape (n_freq, q); NaN where K* is singular."""
+        """Return the entries of R that the coordinates change, shape (n_freq, q); NaN if K* + Z is singular."""
 
     @abstractmethod
     def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
@@ -254,7 +263,7 @@ class JointCoordinates(ABC):
         """Return the derivatives of the parameters by the coordinates, shape (p, p)."""
 
     def matrix(self, entries: ComplexArray) -> ComplexArray:
-        """Return C of its entries, shape (n_freq, n, n); zero where the coordinates change nothing."""
+        """Return R of its entries, shape (n_freq, n, n); zero where the coordinates change nothing."""
         c = np.zeros((len(entries), self.n, self.n), np.complex128)
         c[:, self.rows, self.columns] = c[:, self.columns, self.rows] = entries
         return c

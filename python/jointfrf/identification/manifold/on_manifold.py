@@ -1,12 +1,15 @@
 """FRFs that fit a joint: the manifold on which a fit is linearised.
 
-Whatever the substructures are, the receptances at the two sides of a joint of compliance C can be written on every line
-with two matrices H and M that are free (symmetric where the structure is reciprocal):
+Whatever the substructures are, the receptances at the two sides of a joint K* can be written on every line with two
+free matrices H and Q (symmetric if the structure is reciprocal), and with the compliance R = (K* + Z)^-1 of the joint
+in parallel with reference springs Z, a diagonal matrix:
 
-    gamma_jj = H,   gamma_jk = H T,   gamma_kj = T' H,   gamma_kk = T' H T + C T,   T = 1 - M C,   T' = 1 - C M.
+    gamma_jj = H,   gamma_jk = H F,   gamma_kj = F' H,   gamma_kk = F' H F + R A,
+    A = 1 - Q R,   A' = 1 - R Q,   F = (1 - Z R) A,   F' = A' (1 - R Z).
 
-M is (Y_B + C)^-1 with Y_B the receptance of side k alone. No inverse is needed: the form is regular where gamma_jk
-is singular and for a rigid joint, C = 0.
+No inverse is needed. The form is regular for rigid DOFs, R = 0, and for free ones, R = 1/Z. Without springs R is the
+compliance C of the joint, and Q = M = (Y_B + C)^-1 with Y_B the receptance of side k alone; in general
+M = Z (1 - R Z) + (1 - Z R) Q (1 - R Z).
 """
 
 from __future__ import annotations
@@ -21,7 +24,7 @@ from numpy.typing import NDArray
 from jointfrf.frf.bands import in_pieces, line_slices
 from jointfrf.frf.quantiles import medians
 from jointfrf.identification.manifold.line_forms import LineForms
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.kernel.call import call
 from jointfrf.kernel.linear_algebra import invert, solve
 from jointfrf.substructuring.compliance import joint_compliance
@@ -138,6 +141,8 @@ class LineData(NamedTuple):
         1/sqrt(E|e|^2) of the measured entries; 0 where an entry is not used.
     correlation : ndarray, shape (n_freq, q, q), optional
         Where noise of entries is correlated, lower triangles L that make entries of unit variance uncorrelated.
+    springs : ndarray, shape (n,), optional
+        Reference springs Z of the form, N/m or N m/rad; none by default.
     """
 
     entries: FrfEntries
@@ -145,6 +150,16 @@ class LineData(NamedTuple):
     smooth: ComplexArray
     inverse_std: FloatArray
     correlation: FloatArray | None = None
+    springs: FloatArray | None = None
+
+    @property
+    def reference(self) -> FloatArray:
+        """Reference springs Z of the form, shape (n,), N/m; zero without any."""
+        return np.zeros(self.entries.n) if self.springs is None else self.springs
+
+    def with_springs(self) -> LineData:
+        """Return the same with reference springs as stiff as the structure at each DOF."""
+        return self._replace(springs=1 / np.maximum(self.own_size, TINY))
 
     @property
     def used(self) -> NDArray[np.bool_]:
@@ -166,7 +181,8 @@ class LineData(NamedTuple):
 
     def on_lines(self, lines: NDArray[np.intp] | slice) -> LineData:
         """Return some of the lines; neighbouring ones without a copy."""
-        return LineData(self.entries, *(array[lines] for array in self.arrays))
+        own = [array[lines] for array in self.arrays]
+        return LineData(self.entries, *own)._replace(springs=self.springs)
 
     @property
     def whitening_order(self) -> int:
@@ -187,26 +203,28 @@ class OnManifold(NamedTuple):
 
     Attributes
     ----------
-    h, m : ndarray, shape (n_freq, n, n)
-        The free matrices H, m/N, and M, N/m.
+    h, q : ndarray, shape (n_freq, n, n)
+        The free matrices H, m/N, and Q, N/m.
     squares : ndarray, shape (n_freq,)
         Weighted squares of the distance to the FRFs that were projected.
     """
 
     h: ComplexArray
-    m: ComplexArray
+    q: ComplexArray
     squares: FloatArray
 
 
-def frfs_of_joint(h: ComplexArray, m: ComplexArray, c: ComplexArray) -> ComplexArray:
-    """Return the receptances gamma of H, M and C, shape (n_freq, 2 n, 2 n)."""
+def frfs_of_joint(h: ComplexArray, q: ComplexArray, r: ComplexArray, springs: FloatArray) -> ComplexArray:
+    """Return the receptances gamma of H, Q and R, shape (n_freq, 2 n, 2 n)."""
     one = np.eye(h.shape[-1])
-    right, left = one - m @ c, one - c @ m
+    a, t = one - q @ r, one - springs[:, None] * r
+    right = t @ a
+    left = (one - r @ q) @ (one - r * springs)
     h_right = h @ right
-    return np.block([[h, h_right], [left @ h, left @ h_right + c @ right]])
+    return np.block([[h, h_right], [left @ h, left @ h_right + r @ a]])
 
 
-def project(target: ComplexArray, data: LineData, c: ComplexArray, start: OnManifold, steps: int) -> OnManifold:
+def project(target: ComplexArray, data: LineData, r: ComplexArray, start: OnManifold, steps: int) -> OnManifold:
     """Find the FRFs nearest to `target` that fit a joint, by Levenberg-Marquardt steps on each line.
 
     Parameters
@@ -215,8 +233,8 @@ def project(target: ComplexArray, data: LineData, c: ComplexArray, start: OnMani
         Entries of FRFs, m/N.
     data : LineData
         Their weights.
-    c : ndarray, shape (n_freq, n, n)
-        Compliance of the joint, m/N.
+    r : ndarray, shape (n_freq, n, n)
+        Compliance R of the joint with the reference springs of the data, m/N.
     start : OnManifold
         Its squares are not used.
     steps : int
@@ -225,29 +243,29 @@ def project(target: ComplexArray, data: LineData, c: ComplexArray, start: OnMani
     Returns
     -------
     OnManifold
-        Squares are infinite, and H and M those of the start, where the line holds NaN or Inf or the start overflows.
+        Squares are infinite, and H and Q those of the start, where the line holds NaN or Inf or the start overflows.
     """
     n_freq = len(target)
-    h, m = (np.array(x, np.complex128, order="C") for x in (start.h, start.m))
+    h, q = (np.array(x, np.complex128, order="C") for x in (start.h, start.q))
     squares, line_info = np.empty(n_freq), np.empty(n_freq, np.int32)
     for own in line_slices(n_freq) if n_freq else []:
         part = data.on_lines(own)
         sizes = (int(data.entries.reciprocal), data.entries.n, data.whitening_order, len(part.measured))
-        lines = _lines(part, data.entries.matrix(target[own]), c[own])
-        call("project_on_joint", [*sizes, steps, _GAIN, *lines, h[own], m[own], squares[own], line_info[own]])
+        lines = _lines(part, data.entries.matrix(target[own]), r[own])
+        call("project_with_springs", [*sizes, steps, _GAIN, *lines, h[own], q[own], squares[own], line_info[own]])
     bad = line_info != 0
     if bad.any():
-        h[bad], m[bad], squares[bad] = start.h[bad], start.m[bad], np.inf
-    return OnManifold(h, m, squares)
+        h[bad], q[bad], squares[bad] = start.h[bad], start.q[bad], np.inf
+    return OnManifold(h, q, squares)
 
 
-def normal_forms(data: LineData, c: ComplexArray, on: OnManifold, targets: tuple[ComplexArray, ...]) -> list[LineForms]:
-    """Return the quadratic forms of C that FRFs give about a point of the manifold; H and M are eliminated.
+def normal_forms(data: LineData, r: ComplexArray, on: OnManifold, targets: tuple[ComplexArray, ...]) -> list[LineForms]:
+    """Return the quadratic forms of R that FRFs give about a point of the manifold; H and Q are eliminated.
 
     Parameters
     ----------
     data : LineData
-    c : ndarray, shape (n_freq, n, n)
+    r : ndarray, shape (n_freq, n, n)
     on : OnManifold
         Point about which is linearised.
     targets : tuple of ndarray, shape (n_freq, q)
@@ -256,10 +274,10 @@ def normal_forms(data: LineData, c: ComplexArray, on: OnManifold, targets: tuple
     Returns
     -------
     list of LineForms
-        One for each of `targets`; entries of C are by the unit matrices of `FrfEntries`. NaN where a line holds NaN or
+        One for each of `targets`; entries of R are by the unit matrices of `FrfEntries`. NaN where a line holds NaN or
         Inf.
     """
-    entries, n_freq = data.entries, len(c)
+    entries, n_freq = data.entries, len(r)
     u = len(entries.units)
     weight = np.empty((n_freq, u, u), np.complex128)
     gradient = np.empty((len(targets), n_freq, u), np.complex128)
@@ -268,86 +286,113 @@ def normal_forms(data: LineData, c: ComplexArray, on: OnManifold, targets: tuple
         part = data.on_lines(own)
         n_own = len(part.measured)
         sizes = (int(entries.reciprocal), entries.n, u, data.whitening_order, n_own, len(targets))
-        lines = _lines(part, np.array([entries.matrix(target[own]) for target in targets]), c[own])
-        point = [np.ascontiguousarray(x[own]) for x in (on.h, on.m)]
+        lines = _lines(part, np.array([entries.matrix(target[own]) for target in targets]), r[own])
+        point = [np.ascontiguousarray(x[own]) for x in (on.h, on.q)]
         found = np.empty((len(targets), n_own, u), np.complex128), np.empty((len(targets), n_own))
-        call("joint_forms", [*sizes, *lines, *point, weight[own], *found, np.empty(n_own, np.int32)])
+        call("forms_with_springs", [*sizes, *lines, *point, weight[own], *found, np.empty(n_own, np.int32)])
         gradient[:, own], squares[:, own] = found
     a, b = entries.free
-    return [LineForms(c[:, a, b], weight, p, s) for p, s in zip(gradient, squares, strict=True)]
+    return [LineForms(r[:, a, b], weight, p, s) for p, s in zip(gradient, squares, strict=True)]
 
 
-def _lines(data: LineData, gamma: ComplexArray, c: ComplexArray) -> tuple[NDArray[Any], ...]:
-    """Return FRFs, weights, whitening and C as the kernel takes them."""
-    return gamma, *data.weighing, np.ascontiguousarray(c, np.complex128)
+def _lines(data: LineData, gamma: ComplexArray, r: ComplexArray) -> tuple[NDArray[Any], ...]:
+    """Return springs, FRFs, weights, whitening and R as the kernel takes them."""
+    return data.reference, gamma, *data.weighing, np.ascontiguousarray(r, np.complex128)
 
 
-def starts_on_manifold(data: LineData, c: ComplexArray, steps: int) -> OnManifold:
-    """Find the FRFs nearest to the smooth ones that fit a joint of compliance c; the best of several starts of a line.
+def starts_on_manifold(data: LineData, r: ComplexArray, steps: int) -> OnManifold:
+    """Find the FRFs nearest to the smooth ones that fit a joint; the best of several starts of a line.
 
     Parameters
     ----------
     data : LineData
-    c : ndarray, shape (n_freq, n, n)
-        Compliance of the joint, m/N.
+    r : ndarray, shape (n_freq, n, n)
+        Compliance R of the joint with the reference springs of the data, m/N.
     steps : int
         Steps of the projection at most.
     """
     gamma, n = data.entries.matrix(data.smooth), data.entries.n
     # A view: what was found replaces gamma_jj where the next starts are sought.
     h = gamma[:, :n, :n]
-    best = OnManifold(h, np.zeros_like(h), np.full(len(c), np.inf))
-    for first_m in _FIRST_M:
+    best = OnManifold(h, np.zeros_like(h), np.full(len(r), np.inf))
+    for first_q in _FIRST_WITH_SPRINGS if data.reference.any() else _FIRST:
         far = np.flatnonzero(~(best.squares <= _FAR_OFF * np.median(best.squares)) | ~np.isfinite(best.squares))
         if far.size == 0:
             break
         own = data.on_lines(far)
         with np.errstate(all="ignore"):
-            m = first_m(gamma[far], c[far])
+            q = first_q(gamma[far], r[far], data.reference)
         if data.entries.reciprocal:
-            m = (m + m.swapaxes(1, 2)) / 2
-        m = np.where(np.isfinite(m).all(axis=(1, 2), keepdims=True), m, 0)
-        found = project(own.smooth, own, c[far], OnManifold(h[far], m, best.squares[far]), steps)
+            q = (q + q.swapaxes(1, 2)) / 2
+        q = np.where(np.isfinite(q).all(axis=(1, 2), keepdims=True), q, 0)
+        found = project(own.smooth, own, r[far], OnManifold(h[far], q, best.squares[far]), steps)
         nearer = ~(found.squares >= best.squares[far])
         for whole, part in zip(best, found, strict=True):
             whole[far[nearer]] = part[nearer]
     return best
 
 
-def _from_jj(gamma: ComplexArray, c: ComplexArray) -> ComplexArray:
-    """Return M = (1 - T) K* with T of gamma_jk = gamma_jj T."""
-    n = c.shape[-1]
-    return (np.eye(n) - solve(gamma[:, :n, :n], gamma[:, :n, n:], on_singular="nan")) @ _inverse(c)
+def _from_jk(gamma: ComplexArray, r: ComplexArray, springs: FloatArray) -> ComplexArray:
+    """Return Q = (1 - A) R^-1 with A of gamma_jk = gamma_jj A; without springs."""
+    n = r.shape[-1]
+    return (np.eye(n) - solve(gamma[:, :n, :n], gamma[:, :n, n:], on_singular="nan")) @ _inverse(r)
 
 
-def _from_kj(gamma: ComplexArray, c: ComplexArray) -> ComplexArray:
-    """Return M = (1 - T) K* with T of gamma_kk = (gamma_kj + C) T."""
-    n = c.shape[-1]
-    return (np.eye(n) - solve(gamma[:, n:, :n] + c, gamma[:, n:, n:], on_singular="nan")) @ _inverse(c)
+def _from_kj(gamma: ComplexArray, r: ComplexArray, springs: FloatArray) -> ComplexArray:
+    """Return Q = (1 - A) R^-1 with A of gamma_kk = (gamma_kj (1 - Z R) + R) A."""
+    n = r.shape[-1]
+    left = gamma[:, n:, :n] @ (np.eye(n) - springs[:, None] * r) + r
+    return (np.eye(n) - solve(left, gamma[:, n:, n:], on_singular="nan")) @ _inverse(r)
 
 
-def _from_inverse(gamma: ComplexArray, c: ComplexArray) -> ComplexArray:
-    """Return M = (C + Y_B)^-1 with Y_B of the inverse of gamma."""
-    n = c.shape[-1]
-    return _inverse(c + _inverse(_inverse(gamma)[:, n:, n:] - _inverse(c)))
+def _from_inverse(gamma: ComplexArray, r: ComplexArray, springs: FloatArray) -> ComplexArray:
+    """Return Q = M = (C + Y_B)^-1 with Y_B of the inverse of gamma; without springs."""
+    n = r.shape[-1]
+    return _inverse(r + _inverse(_inverse(gamma)[:, n:, n:] - _inverse(r)))
+
+
+def _from_kk(gamma: ComplexArray, r: ComplexArray, springs: FloatArray) -> ComplexArray:
+    """Return Q by least squares, by entry, of gamma_jk = H F and gamma_kk - gamma_kj H^-1 gamma_jk = R - R Q R."""
+    n = r.shape[-1]
+    d = np.einsum("lpp->lp", r)
+    t, one = 1 - springs * d, np.eye(n)
+    ratio = solve(gamma[:, :n, :n], gamma[:, :n, n:], on_singular="nan")
+    own = gamma[:, n:, n:] - gamma[:, n:, :n] @ ratio
+    # The first equation is divided by the springs, so that both are compliances.
+    of_jk, left = (t / springs)[:, :, None] * d[:, None, :], (t[:, :, None] * one - ratio) / springs[:, None]
+    of_kk, right = d[:, :, None] * d[:, None, :], d[:, :, None] * one - own
+    found: ComplexArray = (of_jk.conj() * left + of_kk.conj() * right) / (abs(of_jk) ** 2 + abs(of_kk) ** 2)
+    return found
 
 
 def _inverse(a: ComplexArray) -> ComplexArray:
     return invert(a, on_singular="nan")
 
 
-#: Algebraic first values of M, exact without noise; none last.
-_FIRST_M: tuple[Callable[[ComplexArray, ComplexArray], ComplexArray], ...] = (
-    _from_jj,
+#: Algebraic first values of Q, exact without noise; none last.
+_FIRST: tuple[Callable[[ComplexArray, ComplexArray, FloatArray], ComplexArray], ...] = (
+    _from_jk,
     _from_kj,
     _from_inverse,
-    lambda gamma, c: np.zeros_like(c),
+    lambda gamma, r, springs: np.zeros_like(r),
 )
+#: The same for a joint without cross terms and with reference springs.
+_FIRST_WITH_SPRINGS = (_from_kk, _from_kj, _FIRST[-1])
 
 
 def smooth_compliance(data: LineData) -> ComplexArray:
-    """Return C of the smooth FRFs, shape (n_freq, n, n); zero where they do not give it."""
-    compliance = joint_compliance(data.entries.matrix(data.smooth), on_singular="nan")
+    """Return R of the smooth FRFs, shape (n_freq, n, n), m/N; zero where they do not give it.
+
+    With F0 = gamma_jj^-1 gamma_jk and P = gamma_kk - gamma_kj F0, R = P (F0 + Z P)^-1.
+    """
+    gamma = data.entries.matrix(data.smooth)
+    if data.springs is None:
+        compliance = joint_compliance(gamma, on_singular="nan")
+    else:
+        n = data.entries.n
+        ratio = solve(gamma[:, :n, :n], gamma[:, :n, n:], on_singular="nan")
+        own = gamma[:, n:, n:] - gamma[:, n:, :n] @ ratio
+        compliance = own @ _inverse(ratio + data.reference[:, None] * own)
     if data.entries.reciprocal:
         compliance = (compliance + compliance.swapaxes(1, 2)) / 2
     good = np.isfinite(compliance).all(axis=(1, 2), keepdims=True)
@@ -396,14 +441,14 @@ def prior_of_m(data: LineData) -> PriorOfM:
     return PriorOfM(size, float(np.sqrt(np.clip(1 - left, _LEAST_SHARE**2, 1))))
 
 
-def expected_m(data: LineData, c: ComplexArray, on: OnManifold, prior: PriorOfM) -> OnManifold:
+def expected_m(data: LineData, r: ComplexArray, on: OnManifold, prior: PriorOfM) -> OnManifold:
     """Move from the FRFs nearest to the smooth ones to those of the expected M, and of the H that belongs to it.
 
     Parameters
     ----------
     data : LineData
-    c : ndarray, shape (n_freq, n, n)
-        Compliance of the joint, m/N.
+    r : ndarray, shape (n_freq, n, n)
+        Compliance R of the joint with the reference springs of the data, m/N.
     on : OnManifold
         The nearest FRFs; their squares are kept.
     prior : PriorOfM
@@ -411,13 +456,14 @@ def expected_m(data: LineData, c: ComplexArray, on: OnManifold, prior: PriorOfM)
     Notes
     -----
     The mean of M where it is normal about 0 and the error of the smooth FRFs is normal: the least squares of both
-    together, by one Gauss-Newton step for H and M. Where FRFs show M well, it stays as it is.
+    together, by one Gauss-Newton step for H and Q. Where FRFs show M well, it stays as it is.
     """
-    h, m = (np.array(x, np.complex128, order="C") for x in (on.h, on.m))
-    line_info = np.empty(len(c), np.int32)
-    sizes = (int(data.entries.reciprocal), data.entries.n, data.whitening_order, len(c))
+    h, q = (np.array(x, np.complex128, order="C") for x in (on.h, on.q))
+    line_info = np.empty(len(r), np.int32)
+    sizes = (int(data.entries.reciprocal), data.entries.n, data.whitening_order, len(r))
     spread = np.ascontiguousarray(prior.size)
-    call("expect_on_joint", [*sizes, prior.share, spread, *data.weighing, np.ascontiguousarray(c), h, m, line_info])
+    known = prior.share, spread, data.reference, *data.weighing, np.ascontiguousarray(r)
+    call("expect_with_springs", [*sizes, *known, h, q, line_info])
     bad = line_info != 0
-    h[bad], m[bad] = on.h[bad], on.m[bad]
-    return on._replace(h=h, m=m)
+    h[bad], q[bad] = on.h[bad], on.q[bad]
+    return on._replace(h=h, q=q)

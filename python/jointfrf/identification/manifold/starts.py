@@ -33,7 +33,7 @@ def first_joints(data: LineData, joint: SpringJoint) -> list[FloatArray]:
     """Return coordinates of the joint from the compliance of the smooth FRFs, the likeliest first.
 
     C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj of the smooth FRFs on every line, with the covariance that a share of
-    the noise gives it; lines on which noise hides gamma_jk count little.
+    the noise gives it, and from it R = (1 + C Z)^-1 C; lines on which noise hides gamma_jk count little.
     """
     n, is_diagonal = data.entries.n, joint.in_compliance
     a = range(n)
@@ -44,6 +44,8 @@ def first_joints(data: LineData, joint: SpringJoint) -> list[FloatArray]:
         compliance = joint_compliance(gamma, on_singular="nan")
         covariance = _SMOOTH**2 * compliance_covariance(gamma, spread, np.eye(2 * n), on_singular="nan")
         ratio = _hidden(gamma, spread)
+        if data.springs is not None:
+            compliance, covariance = _with_springs(compliance, covariance, data.springs)
         good = np.isfinite(compliance).all(axis=(1, 2)) & np.isfinite(covariance).all(axis=(1, 2)) & np.isfinite(ratio)
         variance = covariance.reshape(-1, n, n, n, n)[:, a, a, a, a].real
         return [good, compliance, variance, ratio] if is_diagonal else [good, compliance, variance, ratio, covariance]
@@ -58,6 +60,17 @@ def first_joints(data: LineData, joint: SpringJoint) -> list[FloatArray]:
     if is_diagonal:
         return _diagonal_starts(compliance[:, a, a], own, line_weight, here)
     return _coupled_starts(compliance, covariance[0], own, line_weight, here)
+
+
+def _with_springs(
+    compliance: ComplexArray, covariance: ComplexArray, springs: FloatArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return R = (1 + C Z)^-1 C and its covariance from those of C: dR = (1 + C Z)^-1 dC (1 + Z C)^-1."""
+    n = compliance.shape[-1]
+    left = invert(np.eye(n) + compliance * springs, on_singular="nan")
+    right = invert(np.eye(n) + springs[:, None] * compliance, on_singular="nan")
+    slope = np.einsum("lac,ldb->labcd", left, right).reshape(-1, n * n, n * n)
+    return left @ compliance, slope @ covariance @ slope.conj().swapaxes(1, 2)
 
 
 def _variance(data: LineData) -> FloatArray:
@@ -108,7 +121,7 @@ def _diagonal_starts(
 def _coupled_starts(
     value: ComplexArray, covariance: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: SpringJoint
 ) -> list[FloatArray]:
-    """Fit all entries of C; first values from K* C = 1 by linear least squares, and from the mean of C."""
+    """Fit all entries of R; first values from K* R = 1 - Z R by linear least squares, and from the mean of R."""
     n = joint.n
     a, b = joint.rows, joint.columns
     size = np.sqrt(np.maximum(np.einsum("lqq->lq", covariance).real, np.finfo(float).tiny))
@@ -136,20 +149,20 @@ def _coupled_starts(
 
 
 def _mean_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: SpringJoint) -> FloatArray:
-    """Return the stiffness whose compliance is the weighted mean of Re C, no damping."""
+    """Return the stiffness whose compliance is the weighted mean of Re R, no damping."""
     w = line_weight / own.max(axis=1)
     size = np.sqrt(np.median(abs(np.einsum("laa->la", value)), axis=0))
     scaled = value.real / np.outer(size, size)
     w = line_weight / (own / size**4).max(axis=1)
     mean = np.tensordot(w, scaled, 1) / w.sum()
-    k = np.linalg.pinv((mean + mean.T) / 2, hermitian=True) / np.outer(size, size)
+    k = np.linalg.pinv((mean + mean.T) / 2, hermitian=True) / np.outer(size, size) - np.diag(joint.springs)
     terms, first = joint.terms, joint.terms.first
     start: FloatArray = np.where(terms.kinds[first] == 0, k[tuple(terms.pairs[first].T)], 0.0)
     return start
 
 
 def _linear_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: SpringJoint) -> FloatArray:
-    """Solve K*(theta) C = 1 by weighted linear least squares in units of each DOF: exact without noise."""
+    """Solve K*(theta) R = 1 - Z R by weighted linear least squares in units of each DOF: exact without noise."""
     terms, n = joint.terms, joint.n
     size = np.sqrt(np.median(abs(np.einsum("laa->la", value)), axis=0))
     c = value / np.outer(size, size)
@@ -163,7 +176,7 @@ def _linear_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray,
         if a != b:
             column[:, b] = c[:, a]
         columns.append((column * (root * factors[kind])[:, None, None]).ravel())
-    right = (root[:, None, None] * np.eye(n)).astype(np.complex128).ravel()
+    right = (root[:, None, None] * (np.eye(n) - (joint.springs * size**2)[:, None] * c)).ravel()
     units = size[terms.pairs[:, 0]] * size[terms.pairs[:, 1]] * scale[terms.kinds]
     of_parameter = units[terms.first]
     matrix = summed_terms(np.array(columns).T * (units / of_parameter[terms.shared]), terms.shared)

@@ -187,7 +187,8 @@ def _limits(group: FormMinimum, i: int, factor: float, probability: float) -> tu
     reach = float(special.ndtri((1 + probability) / 2))
     if joint.is_compliance[i]:
         own = reach * float(np.sqrt(max(covariance[i, i], 0)))
-        return float(1 / (x[i] + own)), float(1 / (x[i] - own))
+        spring = float(joint.springs[joint.dofs[i]])
+        return float(1 / (x[i] + own)) - spring, float(1 / (x[i] - own)) - spring
     slope = joint.theta_slope(x)[i]
     value, own = float(joint.theta(x)[i]), reach * float(np.sqrt(max(slope @ covariance @ slope, 0)))
     return value - own, value + own
@@ -200,8 +201,10 @@ def _widened(group: GroupFit, i: int, limits: tuple[float, float], reach: float)
     """
     (low, high), joint = limits, group.joint
     theta = float(joint.theta(group.x)[i])
-    if joint.is_compliance[i]:
-        compliance = float(group.x[i])
+    if joint.is_compliance[i] and theta > 0:
+        compliance = 1 / theta
+    elif joint.is_compliance[i]:
+        return limits
     elif joint.is_stiffness[i] and theta > 0 and low > 0:
         compliance, reach = 1 / theta, reach / theta**2
     else:
