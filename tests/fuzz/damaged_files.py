@@ -67,7 +67,7 @@ class DamagedFiles:
                 path = folder / name
                 make(path)
                 self.sound[name] = path.read_bytes()
-                self.read[name] = _content(read_frfs(path, quantity="accelerance", force_quantity=True))
+                self.read[name] = _content(read_frfs(path, unit="m/s^2/N", force_quantity=True))
         self.names = sorted(self.sound)
         weights = np.array([1.0 / _SLOW.get(name, 1) for name in self.names])
         self.edges = np.cumsum(weights / weights.sum())
@@ -81,7 +81,7 @@ class DamagedFiles:
         with warnings.catch_warnings(record=True) as reported:
             warnings.simplefilter("always")
             try:
-                found = read_frfs(path, quantity="accelerance", force_quantity=True)
+                found = read_frfs(path, unit="m/s^2/N", force_quantity=True)
             except (jf.FileContentError, FileNotFoundError) as error:
                 message = str(error)
                 if "\n" in message or len(message) > _LONGEST_MESSAGE or path.name not in message:

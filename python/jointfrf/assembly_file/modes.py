@@ -10,7 +10,7 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from jointfrf.cases.keys import MAP, read_frf_file
+from jointfrf.cases.keys import MAP, UNIT, read_frf_file
 from jointfrf.cases.structure import Structure, SubstructureKeys
 from jointfrf.dofs import direction_names, similar_dof
 from jointfrf.io.fe.nodes import NodeFile, read_dof_names, read_nodes
@@ -89,14 +89,17 @@ class ModesKeys(SubstructureKeys, tag="modes"):
         ),
     ] = None
     units: Annotated[
-        UnitSystemName | None, key("Units of the file of `nodes`.", absent="SI, or those of a Universal File")
-    ] = None
+        UnitSystemName | None,
+        key("Units of the file of `nodes`, and of modes and nodes of a Universal File without dataset 164.",
+            absent="by dataset 164"),
+    ] = None  # fmt: skip
     residuals: Annotated[
         str | None,
         key("FRFs of the part by themselves, from which residuals of modes below and above the band are fitted, pair "
             "by pair.", takes="name of a file of FRFs", absent="those of the file, or none"),
     ] = None  # fmt: skip
     map: Annotated[dict[str, str], MAP] = msgspec.field(default_factory=dict)
+    unit: Annotated[str, UNIT] = ""
     damping_ratio: Annotated[
         float, key("Damping ratio of modes for which the file has none, as those of FE programs.", ge=0, le=0.99)
     ] = 0.0
@@ -104,14 +107,15 @@ class ModesKeys(SubstructureKeys, tag="modes"):
     def structure(self, freq_hz: FloatArray) -> Structure:
         """Return the structure."""
         path = self.file_of("file")
-        found = self.build(partial(read_modes, path), "file")
+        units = None if self.units is None else model_units(self.units)
+        found = self.build(partial(read_modes, path, units=units), "file")
         dofs = self._names(found)
         if found.is_rigid.any() and found.modal_mass is None:
             raise self.wrong("file", "complex modes at 0 Hz have no scale; leave them out and add residuals")
         file = self._node_file(found)
         if self.nodes is not None and not found.has_nodes:  # those of the modes' own file are turned
             dofs = file.named(dofs)
-        length = 1.0 if file.is_si else model_units(self.units or "SI").length
+        length = 1.0 if file.is_si or self.units is None else model_units(self.units).length
         places = {node: length * at for node, at in file.coordinates.items()}
         modes = _modal_frfs(found, dofs, self.damping_ratio)
         whole = ModalStructure(modes, (), places)
@@ -142,11 +146,14 @@ class ModesKeys(SubstructureKeys, tag="modes"):
         if self.nodes is None and not found.has_nodes:
             return NodeFile()
         name = "file" if self.nodes is None else "nodes"
-        return self.build(partial(read_nodes, self.file_of(name)), name)
+        file = self.build(partial(read_nodes, self.file_of(name)), name)
+        if self.units is None and not file.is_si and file.coordinates:
+            raise self.missing(["units"], f"{self.file_of(name).name} states no unit")
+        return file
 
     def _with_residuals(self, whole: ModalStructure) -> tuple[ModalFrfs, list[str]]:
         """Return the modes with residuals of measured FRFs, and what these cover."""
-        frfs = read_frf_file(self, "residuals", mapping=self.map)
+        frfs = read_frf_file(self, "residuals", mapping=self.map, unit=self.unit)
         held = [[_named(f"{one.node}:{one.axis}") for one in own] for own in (frfs.responses, frfs.excitations)]
         names = [dof for dof in dict.fromkeys([*held[0], *held[1]]) if dof in whole.modes.dofs]
         h = np.full((frfs.freq_hz.size, len(names), len(names)), np.nan + 0j)

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from msgspec import field
@@ -70,6 +70,14 @@ MAP = key(
 )
 
 
+#: Units that a file of FRFs does not state, as `--unit` says on the command line.
+UNIT = key(
+    'Unit of the FRFs, if their file does not state one that is understood: `"g/N"`, `"mm/kN, frequency=kHz"`.',
+    takes="text",
+    absent="by the file",
+)
+
+
 class FrequencyKeys(Keys):
     """Frequency lines: evenly spaced, or those of a file of FRFs."""
 
@@ -92,6 +100,7 @@ class FrequencyKeys(Keys):
         str | None, key("Take the lines of the FRFs in this file.", takes="name of a file of FRFs", absent="not used")
     ] = None
     map: Annotated[dict[str, str], MAP] = field(default_factory=dict)
+    unit: Annotated[str, UNIT] = ""
 
     def lines(self) -> FloatArray:
         """Return the frequency lines, Hz; raises FileContentError."""
@@ -114,7 +123,7 @@ class FrequencyKeys(Keys):
     def _lines_of_file(self) -> FloatArray:
         if self.step is not None:
             raise self.wrong("step", "the lines are those of the file that from_file names")
-        held = read_frf_file(self, "from_file", mapping=self.map).freq_hz
+        held = read_frf_file(self, "from_file", mapping=self.map, unit=self.unit).freq_hz
         low, high = self.first or 0.0, np.inf if self.last is None else self.last
         lines = held[(held >= low) & (held <= high)]
         if not lines.size:
@@ -382,10 +391,12 @@ def read_frf_file(
     *,
     force_quantity: bool = False,
     mapping: Mapping[str, str] | None = None,
+    unit: str = "",
 ) -> FrfSet:
     """Read the receptances of a file that a key names; a line at 0 Hz that they do not have is left out."""
     path = keys.file_of(name)
-    frfs = keys.build(lambda: read_frfs(path, quantity=quantity, force_quantity=force_quantity, mapping=mapping), name)
+    options: dict[str, Any] = {"force_quantity": force_quantity, "mapping": mapping, "unit": unit}
+    frfs = keys.build(lambda: read_frfs(path, quantity=quantity, **options), name)
     with warnings.catch_warnings():
         # No case has a line at 0 Hz.
         warnings.simplefilter("ignore", FileContentWarning)

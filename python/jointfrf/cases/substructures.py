@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import field
 from scipy import sparse
 
-from jointfrf.cases.keys import MAP, MaterialKeys, read_frf_file
+from jointfrf.cases.keys import MAP, UNIT, MaterialKeys, read_frf_file
 from jointfrf.cases.structure import MeasuredStructure, ModelStructure, Structure, SubstructureKeys
 from jointfrf.dofs import DIRECTIONS
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA
@@ -379,15 +379,18 @@ class ReceptancesKeys(SubstructureKeys, tag="receptances"):
         str | None,
         key("What the FRFs are, where the file does not say.", choice=POWER_OF_I_OMEGA, absent="by the file"),
     ] = None
-    force_quantity: Annotated[bool, key("`true`: `quantity` holds also where the file says something else.")] = False
+    force_quantity: Annotated[
+        bool, key("`true`: take `quantity` and `unit` also if the file states something else.")
+    ] = False
     map: Annotated[dict[str, str], MAP] = field(default_factory=dict)
+    unit: Annotated[str, UNIT] = ""
 
     def structure(self, freq_hz: FloatArray) -> Structure:
         """Return the structure."""
-        if self.force_quantity and self.quantity is None:
-            raise self.wrong("force_quantity", "there is no quantity to force")
+        if self.force_quantity and self.quantity is None and not self.unit:
+            raise self.wrong("force_quantity", "there is no quantity or unit to force")
         found = MeasuredStructure(read_frf_file(
-            self, "file", self.quantity, force_quantity=self.force_quantity, mapping=self.map
+            self, "file", self.quantity, force_quantity=self.force_quantity, mapping=self.map, unit=self.unit
         ))  # fmt: skip
         self.build(lambda: found.lines_at(freq_hz), "file")
         return found

@@ -19,7 +19,7 @@ __all__ = ["CONFIGURATION", "with_configuration"]
 CONFIGURATION = "jointfrf.toml"
 #: Options that are not defaults of anything.
 _NO_DEFAULTS = ("--help", "-h", "--config", "--no-config")
-#: Keys of a table of channels, which may be in the same file.
+#: Keys of a table of channels, which may be in the same file; without channels `unit` is the one of the FRFs.
 _CHANNELS = ("unit", "channel")
 #: What a file that was found, not named, may set beside which joint is in the FRFs: it may be a stranger's.
 _OF_THE_FIT = ("--method", "--damping", "--cross", "--noise", "--bending-stiffness")
@@ -57,7 +57,8 @@ def with_configuration(args: argparse.Namespace, parser: CommandParser, command:
     own = table.table(command) if command in table.content else None
     _check_keys(table, own, shared, options)
     typed, is_used = set(args.given), "channel" in table.content and "--channels" in options
-    everywhere = [(table, key) for key in table.content if key not in (*COMMANDS, *_CHANNELS)]
+    of_channels = _CHANNELS if "channel" in table.content else ()
+    everywhere = [(table, key) for key in table.content if key not in (*COMMANDS, *of_channels)]
     for source, key in everywhere + ([(own, key) for key in own.content] if own else []):
         if is_found and _option(key) not in (*shared, *_OF_THE_FIT):
             raise source.wrong(

@@ -24,7 +24,7 @@ from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.extras import check_extras
 from jointfrf.frf.merge import same_lines
 from jointfrf.io import Channel, FrfSet, read_frfs, write_frfs
-from jointfrf.io.formats import check_suffix, format_names
+from jointfrf.io.formats import check_suffix, format_names, read_frf_sets
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.toml.table import TomlTable, read_toml
 
@@ -273,7 +273,9 @@ def read_structures(paths: Sequence[Path], freq_hz: FloatArray | None, **options
     FileContentError
         Files do not have the same lines, or something in one is wrong.
     """
-    measured = {path: read_frfs(path, **options).receptance() for path in paths if not is_model(path)}
+    files = [path for path in paths if not is_model(path)]
+    sets = read_frf_sets(*files, **options) if files else []
+    measured = {path: found.receptance() for path, found in zip(files, sets, strict=True)}
     if measured:
         first = next(iter(measured.values()))
         for each in measured.values():

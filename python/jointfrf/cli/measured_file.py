@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable
 from dataclasses import fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import UsageError
+from jointfrf.cli.usage import UsageError, positive
 from jointfrf.dofs import direction_names
 from jointfrf.errors import FileContentError
 from jointfrf.frf.bands import in_bands
@@ -19,6 +20,7 @@ from jointfrf.frf.setups import SetUps
 from jointfrf.io import FrfSet, read_frfs
 from jointfrf.io.file_format import FrfMapping
 from jointfrf.io.formats import format_names
+from jointfrf.io.units import StatedUnits
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.spelling import did_you_mean
 
@@ -46,7 +48,7 @@ __all__ = [
 #: Longer ranges of nodes are slips.
 _MOST_NODES = 100_000
 #: Options that say what the FRFs of files are, and where they stand in them.
-READING = ("--quantity", "--force-quantity", "--map")
+READING = ("--quantity", "--force-quantity", "--unit", "--skip-lines", "--map")
 #: What --map may name.
 _FIELDS = tuple(field.name for field in fields(FrfMapping))
 #: Nodes that a message lists.
@@ -212,7 +214,14 @@ def add_reading_arguments(parser: CommandParser) -> None:
     parser.option(
         "--quantity", "quantity of the FRFs, if the file does not state it", ("receptance", "mobility", "accelerance")
     )
-    parser.option("--force-quantity", "use --quantity even if the file states another quantity")
+    parser.option("--force-quantity", "use --quantity and --unit even if the file states another quantity or unit")
+    parser.option(
+        "--unit UNIT",
+        "unit of the FRFs, if the file does not state one that is understood: g/N, mm/kN, 'dB re 1 m/N'; other units "
+        "by name: frequency=kHz, phase=rad, coordinates=mm; several between commas",
+        _unit,
+    )
+    parser.option("--skip-lines N", "lines before the heading of a text table", partial(positive, least=0))
     parser.option(
         "--map FIELD=NAME",
         f"name of a field in a MATLAB, NPZ or HDF5 file: {', '.join(_FIELDS)}; responses and excitations also as names "
@@ -220,6 +229,14 @@ def add_reading_arguments(parser: CommandParser) -> None:
         _field,
         repeated=True,
     )
+
+
+def _unit(text: str) -> str:
+    try:
+        StatedUnits.parsed(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return text
 
 
 def _field(text: str) -> tuple[str, str]:
@@ -232,12 +249,13 @@ def _field(text: str) -> tuple[str, str]:
 
 def reading_options(args: argparse.Namespace) -> dict[str, Any]:
     """Return what the command line says of the files, as `jointfrf.io.read_frfs` takes it."""
-    if args.force_quantity and args.quantity is None:
-        raise UsageError("--force-quantity without a quantity; add --quantity")
+    if args.force_quantity and args.quantity is None and args.unit is None:
+        raise UsageError("--force-quantity has no effect without --quantity or --unit; leave it out")
     mapping = dict(args.map or ())
     if len(mapping) < len(args.map or ()):
         raise UsageError("--map names a field twice; name each field once")
-    return {"quantity": args.quantity, "force_quantity": args.force_quantity, "mapping": mapping}
+    stated = {"unit": args.unit or "", "skip_lines": args.skip_lines or 0}
+    return {"quantity": args.quantity, "force_quantity": args.force_quantity, "mapping": mapping, **stated}
 
 
 def read_measured(args: argparse.Namespace) -> FrfSet:

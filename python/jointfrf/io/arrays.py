@@ -13,7 +13,7 @@ from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
 from jointfrf.io.file_format import FrfArrays, Reading
 from jointfrf.io.labels import channels_of_table, is_table
-from jointfrf.io.units import Unit, parse_unit
+from jointfrf.io.units import QUANTITIES, parse_frequency_unit, parse_unit
 from jointfrf.kernel.arguments import as_array, check_type
 from jointfrf.spelling import some_of
 
@@ -55,7 +55,7 @@ def frfs_of_arrays(
     quantity : {"receptance", "mobility", "accelerance"}, optional
         What the FRFs are; by default as `unit` says.
     unit : str
-        Such as ``g/N`` or ``(m/s^2)/N``; SI where it is not given.
+        Unit of the FRFs, such as ``g/N`` or ``(m/s^2)/N``; required.
     axes : str
         Order of the axes of `h` and `coherence`: ``freq,out,in``, ``out,in,freq``, ...
     coherence : array_like, shape of `h`, optional
@@ -104,7 +104,7 @@ def as_frf_set(content: FrfArrays, where: str, reading: Reading) -> FrfSet:
     where : str
         Its name, with which messages begin.
     reading : Reading
-        What the user says; takes a note where the unit is assumed.
+        What the user states.
 
     Raises
     ------
@@ -112,11 +112,11 @@ def as_frf_set(content: FrfArrays, where: str, reading: Reading) -> FrfSet:
         Something does not fit; the message is one sentence.
     """
     try:
-        freq_hz = _frequencies(content.freq_hz)
+        freq_hz = _frequencies(content.freq_hz) * _hertz(content, reading)
         responses, excitations = _channels(content, reading)
         shape = (freq_hz.size, len(responses), len(excitations))
         h = _in_order("FRFs", content.h, content.axes, shape).astype(np.complex128)
-        used, factor, note = _quantity(content, (*responses, *excitations), reading)
+        used, factor = _quantity(content, (*responses, *excitations), reading)
         coherence = None
         if content.coherence is not None:
             coherence = _in_order("coherence", content.coherence, content.axes, shape).astype(np.float64)
@@ -125,6 +125,7 @@ def as_frf_set(content: FrfArrays, where: str, reading: Reading) -> FrfSet:
             averages = _numbers("averages", averages)
             averages = averages.reshape(shape[1:] if averages.size == shape[1] * shape[2] else averages.shape)
         stated = f"{content.quantity or 'FRFs of an unnamed quantity'} [{content.unit or 'no unit'}]"
+        stated += f", unit stated: {reading.units.frf}" if reading.units.frf else ""
         with np.errstate(over="ignore", invalid="ignore"):
             h *= factor
         places = content.coordinates
@@ -133,7 +134,7 @@ def as_frf_set(content: FrfArrays, where: str, reading: Reading) -> FrfSet:
         found, left_out = finite_frfs(whole)
     except (ValueError, TypeError, OverflowError) as error:
         raise FileContentError(f"{where}: {error}") from error
-    reading.notes.extend(f"{where}: {each}" for each in (*content.notes, note, *left_out) if each)
+    reading.notes.extend(f"{where}: {each}" for each in (*content.notes, *left_out) if each)
     return found
 
 
@@ -208,6 +209,16 @@ def _frequencies(values: Any) -> NDArray[np.float64]:
     return freq_hz.astype(np.float64)
 
 
+def _hertz(content: FrfArrays, reading: Reading) -> float:
+    """Return the unit of the frequencies in Hz, the one that the user states or the one of the file."""
+    label = content.frequency_unit
+    stated = parse_frequency_unit(reading.units.frequency)
+    factor = reading.agreed("frequencies", stated, parse_frequency_unit(label), label)
+    if factor is None and label:
+        raise ValueError(f"the unit '{label}' of the frequencies is not understood; give unit= with frequency=Hz")
+    return 1.0 if factor is None else factor
+
+
 def _channels(content: FrfArrays, reading: Reading) -> tuple[tuple[Channel, ...], tuple[Channel, ...]]:
     sides = "responses", "excitations"
     missing = [side for side in sides if getattr(content, side) is None]
@@ -251,31 +262,27 @@ def _without_ones(shape: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(n for n in shape if n != 1)
 
 
-def _quantity(content: FrfArrays, channels: tuple[Channel, ...], reading: Reading) -> tuple[str, float, str]:
-    """Quantity, factor to SI, and what had to be assumed."""
+def _quantity(content: FrfArrays, channels: tuple[Channel, ...], reading: Reading) -> tuple[str, float]:
+    """Quantity and factor to SI."""
     quantity = reading.quantity
     unit = parse_unit(content.unit)
     said = content.quantity.strip().lower()
     if said == "inertance":
         said = "accelerance"
     if said and said not in POWER_OF_I_OMEGA:
-        raise ValueError(f"the quantity {content.quantity!r} is none of {', '.join(POWER_OF_I_OMEGA)}")
-    by_unit = next((name for name, power in POWER_OF_I_OMEGA.items() if unit and _fits(unit, power)), "")
+        raise ValueError(f"unknown quantity {content.quantity!r}; use one of {', '.join(POWER_OF_I_OMEGA)}")
+    by_unit = QUANTITIES.get(unit.exponents, "") if unit else ""
     if said and by_unit and said != by_unit and not quantity:
         raise ValueError(f"the unit '{content.unit}' does not fit {said}; give quantity=")
     agreed = {said, by_unit} - {""}
     if quantity and len(agreed) == 1 and agreed != {quantity} and not reading.forced:
         raise ValueError(f"the file {contradiction(agreed.pop(), quantity, content.unit or 'no unit')}")
     used = quantity or said or by_unit
-    if not used:
-        raise ValueError("it is not said what the FRFs are: give quantity= (receptance, mobility or accelerance)")
-    if unit is not None and _fits(unit, POWER_OF_I_OMEGA[used]):
-        if unit.to_si != 1.0 and any(channel.is_rotation for channel in channels):
-            raise ValueError(f"the unit '{content.unit}' says nothing of rotations: give SI units")
-        return used, unit.to_si, ""
-    why = f"the unit '{content.unit}' is not used" if content.unit else "there is no unit"
-    return used, 1.0, f"{why}: SI units are assumed"
-
-
-def _fits(unit: Unit, power: int) -> bool:
-    return unit.exponents == (1, -1, -power)
+    found = unit.to_si if unit and used and by_unit == used else None
+    factor = reading.agreed("FRFs", reading.units.frf_to_si, found, content.unit)
+    if factor is None:
+        why = f"the unit '{content.unit}' {'does not fit ' + used if unit and used else 'is not understood'}"
+        raise ValueError(f"{why if content.unit else 'the FRFs have no unit'}; give unit=, such as g/N or (m/s^2)/N")
+    if factor != 1.0 and any(channel.is_rotation for channel in channels):
+        raise ValueError(f"the unit '{reading.units.ratio or content.unit}' is none of rotations; give SI units")
+    return used, factor

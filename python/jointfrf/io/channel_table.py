@@ -17,14 +17,16 @@ from numpy.typing import NDArray
 from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import Channel, ChannelPlace, ChannelRole, JointSide
 from jointfrf.io.csv_file import TextTable, read_text_table
+from jointfrf.io.units import parse_unit
+from jointfrf.kernel.arguments import one_line
 from jointfrf.spelling import did_you_mean
 from jointfrf.toml.declared import Keys, NotNegative, key, keys_of, read_keys
 from jointfrf.toml.table import TomlTable, read_toml
 
 __all__ = ["ChannelKeys", "ChannelTableKeys", "places_of_table", "read_channel_table"]
 
-#: Units of positions, in m.
-_UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
+#: A column and its unit.
+_COLUMN = re.compile(r"(\w+) ?(?:[(\[]([^()\[\]]*)[)\]])?")
 #: Directions of a sensor along the axes.
 _TRIAXIAL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 #: How far from 1 the length of a direction may be: that of two digits, as in (0.71, 0, -0.71); it is normalised.
@@ -112,7 +114,9 @@ def places_of_table(table: TomlTable) -> tuple[ChannelPlace, ...]:
 
 
 def _places_of(keys: ChannelTableKeys) -> tuple[ChannelPlace, ...]:
-    return tuple(place for row in keys.channel for place in _places(row, _UNITS[keys.unit]))
+    unit = parse_unit(keys.unit)
+    assert unit is not None
+    return tuple(place for row in keys.channel for place in _places(row, unit.to_si))
 
 
 def _csv_rows(file: Path) -> Iterator[ChannelKeys]:
@@ -129,15 +133,17 @@ def _csv_rows(file: Path) -> Iterator[ChannelKeys]:
 
 def _column(file: Path, word: str) -> tuple[str, float]:
     """Return the name of a column, and what one of its unit is in m."""
-    match = re.fullmatch(r"(\w+)\s*(?:\[\s*(\w+)\s*\])?", word.strip())
+    match = _COLUMN.fullmatch(" ".join(word.split()))
     name = match[1].lower() if match else word.strip()
     if name not in _COLUMNS or match is None:
         hint = did_you_mean(name, _COLUMNS)
-        raise FileContentError(f"{file}: unknown column {name!r}; use one of {', '.join(_COLUMNS)}{hint}")
-    unit = match[2] or ""
-    if unit and (name not in "xyz" or unit not in _UNITS):
-        raise FileContentError(f"{file}: column {word.strip()!r}: only x, y, z have a unit, out of {', '.join(_UNITS)}")
-    return name, _UNITS.get(unit, 1.0)
+        raise FileContentError(f"{file}: unknown column {one_line(name)}; use one of {', '.join(_COLUMNS)}{hint}")
+    if match[2] is None:
+        return name, 1.0
+    unit = parse_unit(match[2])
+    if name not in ("x", "y", "z") or unit is None or unit.exponents != (1, 0, 0):
+        raise FileContentError(f"{file}: column {one_line(word.strip())}: only x, y, z have a unit, such as mm or in")
+    return name, unit.to_si
 
 
 def _csv_values(table: TextTable, where: str, given: Mapping[str, str], scales: Mapping[str, float]) -> dict[str, Any]:

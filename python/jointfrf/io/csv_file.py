@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit, text_of, write_file
 from jointfrf.frf.frf_set import Channel, FrfSet
-from jointfrf.io.file_format import FileFormat, FrfArrays, Reading
+from jointfrf.io.file_format import TIME_DATA, FileFormat, FrfArrays, Reading
 from jointfrf.io.functions import LooseFunction, arrays_of_functions
 from jointfrf.io.labels import ChannelNamer
 from jointfrf.io.named_arrays import fields_of
+from jointfrf.io.units import QUANTITIES, StatedUnits, parse_frequency_unit, parse_level, parse_phase_unit, parse_unit
 
 __all__ = ["CSV", "TextTable", "read_text_table", "write_csv"]
 
@@ -30,14 +31,32 @@ _PARTS = {
     "phase": "phase", "arg": "phase", "angle": "phase",
     "coherence": "coherence", "coh": "coherence",
 }  # fmt: skip
-#: A channel as in ``102:+y`` or ``bar:102 -Z``, and response / excitation; a unit in brackets; the first column.
+#: Other words of a heading: without a meaning, perhaps with a number; or a quantity. Any other word may be a scale.
+_FILLERS = re.compile(
+    r"\b(?:(?:part|of|the|value|values|component|function|response|transfer)|"
+    r"(?:frf|h|hv|channel|ch|record|curve|trace|no)(?:\s?[#:]?\s?\d{1,4})?)\b[.:]?", re.IGNORECASE
+)  # fmt: skip
+_QUANTITY = re.compile(r"\b(receptance|mobility|accelerance|inertance)\b", re.IGNORECASE)
+#: A channel as in ``102:+y`` or ``bar:102 -Z``, and response / excitation.
 _CHANNEL = r"(?<![^\s/,;()\[\]])[^\s/,;()\[\]]*?(?<!\d)\d++[\s:._]*+[+-]?r?[xyz][+-]?"
 _PAIR = re.compile(rf"({_CHANNEL})\s*/\s*({_CHANNEL})(?![a-z])", re.IGNORECASE)
-_UNIT = re.compile(r"\[([^\[\]]*)\]")
-_FREQUENCY = re.compile(r"(f|freq|frequency|freq_hz|hz)\b", re.IGNORECASE)
-#: Factors to Hz and to radians by the unit in brackets; Hz and degrees where there is none.
-_HZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi}
-_RADIANS = {"": np.pi / 180, "deg": np.pi / 180, "°": np.pi / 180, "rad": 1.0}
+#: Names of frequencies and of times in the first column.
+_FREQUENCY = {
+    "f", "freq", "freqs", "frequency", "frequencies", "frequenz", "frequenzen", "fréquence", "frequence", "fréquences",
+    "frecuencia", "frequenza", "frequentie", "frekvens", "frequência", "hz", "omega", "ω", "w",
+}  # fmt: skip
+_TIME = {"t", "time", "times", "zeit", "temps", "tiempo", "tempo", "tijd", "tid"}
+#: A name and its unit in brackets; what stands between them without: `f, Hz`, `freq/Hz`, `freq_hz`, `f in Hz`.
+_BRACKETED = re.compile(r"([^()\[\]{}<>]*)[(\[{<](.+)[)\]}>]")
+_BETWEEN = re.compile(r"[\s,;:/_-]+(?:in )?")
+#: Words of the first column, of which none is a logarithm.
+_WORDS, _LOGARITHM = re.compile(r"[^\W\d_]*(?:[ _.-][^\W\d_]+)*"), re.compile(r"\b(log|lg|ln)\b", re.IGNORECASE)
+_WORD, _UNIT_BEGINS = re.compile(r"[a-z]+", re.IGNORECASE), re.compile(r"[(\[{<]|\bdb\b", re.IGNORECASE)
+#: Factors of coherences by their units.
+_SHARES = {"": 1.0, "-": 1.0, "1": 1.0, "%": 0.01}
+#: Lines below which no heading is sought that a preamble may hide, and what a heading looks like.
+_PREAMBLE = 200
+_HEADING = "frequency [Hz],102:+y / 101:+y real [(m/s^2)/N],102:+y / 101:+y imag [(m/s^2)/N]"
 
 
 class TextTable(NamedTuple):
@@ -72,8 +91,14 @@ class TextTable(NamedTuple):
         return float(cell.replace(",", ".") if self.decimal_comma else cell)
 
 
-def read_text_table(path: Path) -> TextTable:
+def read_text_table(path: Path, skip_lines: int = 0) -> TextTable:
     """Read a table; blank lines and lines that begin with ``#`` are no rows.
+
+    Parameters
+    ----------
+    path : Path
+    skip_lines : int
+        Number of lines at the beginning that are left out, default 0.
 
     Raises
     ------
@@ -84,7 +109,7 @@ def read_text_table(path: Path) -> TextTable:
     lines = (
         (f"{path}: line {number}", line.strip("\x1a"))  # the end of a file of DOS
         for number, line in enumerate(text_of(path).splitlines(), start=1)
-        if line.strip(",;\t \x1a")
+        if number > skip_lines and line.strip(",;\t \x1a")
     )
     stated: dict[str, str] = {}
     for where, line in lines:
@@ -118,28 +143,34 @@ def _cells(where: str, line: str, mark: str) -> list[str]:
 
 def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
     """Read columns whose names say response, excitation, part and unit, after one of frequencies."""
-    table = read_text_table(path)
-    where, first = str(path), table.heading[0]
-    parts: dict[tuple[Channel, Channel], dict[str, tuple[str, NDArray[np.float64]]]] = {}
-    if not _FREQUENCY.match(first):
-        raise FileContentError(f"{where}: the first column must be the frequency, not {first[:40]!r}")
-    hz = _unit_of(first).lower()
-    if hz not in _HZ:
-        raise FileContentError(f"{where}: the unit '{hz}' of the frequency is none of Hz, kHz, rad/s")
-    numbers = np.array([_numbers(table, place, cells) for place, cells in table.rows])
-    if not numbers.size or len(table.heading) < 2:
-        raise FileContentError(f"{path} holds no table of numbers below a heading")
+    table = read_text_table(path, reading.skip_lines)
+    where, units = str(path), reading.units
+    frequency_unit = _frequency_unit(path, table.heading[0], units)
     namer = reading.mapping.namer
-    for name, column in zip(table.heading[1:], numbers.T[1:], strict=True):
-        pair, part = _column(name, where, namer)
-        if part in parts.setdefault(pair, {}):
-            raise FileContentError(f"{where} has two columns {name!r}")
-        parts[pair][part] = _unit_of(name), column
-    freq_hz = numbers[:, 0] * _HZ[hz]
-    functions = [each for pair, columns in parts.items() for each in _functions(pair, columns, freq_hz, where)]
+    columns = [_column(name, where, namer) for name in table.heading[1:]]
+    numbers = np.array([_numbers(table, place, cells) for place, cells in table.rows])
+    if not numbers.size or not columns:
+        raise FileContentError(f"{path} holds no table of numbers below its heading")
+    parts: dict[tuple[Channel, Channel], dict[str, _Column]] = {}
+    for column, values in zip(columns, numbers.T[1:], strict=True):
+        if column.part in parts.setdefault(column.pair, {}):
+            raise FileContentError(f"{where} has two columns {column.part} of {column.pair[0]} / {column.pair[1]}")
+        parts[column.pair][column.part] = column._replace(values=values)
+    stated = table.stated.get("unit", "")
+    functions = [
+        each for pair in parts.values() for each in _functions(pair, numbers[:, 0], stated, reading, where)
+    ]  # fmt: skip
     found = arrays_of_functions(functions, where, limit)
-    found.quantity = table.stated.get("quantity", "")
-    found.unit = found.unit or table.stated.get("unit", "")
+    found.quantity = found.quantity or table.stated.get("quantity", "")
+    found.frequency_unit = frequency_unit
+    phases, levels = (any(each.part == part for each in columns) for part in ("phase", "magnitude"))
+    found.takes = (
+        "skip_lines",
+        "frequency",
+        "components",
+        *(["phase"] if phases else []),
+        *(["level"] if levels else []),
+    )
     if "averages" in table.stated:
         try:
             found.averages = float(table.stated["averages"])
@@ -160,59 +191,177 @@ def _numbers(table: TextTable, place: str, cells: list[str]) -> list[float]:
         raise
 
 
-def _column(name: str, where: str, namer: ChannelNamer) -> tuple[tuple[Channel, Channel], str]:
-    """Response, excitation and part that a heading names."""
+def _frequency_unit(path: Path, name: str, units: StatedUnits) -> str:
+    """Return the unit of the first column; empty if the user states it.
+
+    Raises
+    ------
+    FileContentError
+        The column is not the frequency, or its unit is missing.
+    """
+    word, unit = _name_and_unit(name)
+    if parse_frequency_unit(unit) is not None or (word in _FREQUENCY and (units.frequency or unit)):
+        return unit  # which the reader of all formats compares with the stated one, or calls not understood
+    if word in _FREQUENCY:
+        raise FileContentError(
+            f"{path}: no unit in the heading {name[:40]!r}; write 'frequency [Hz]' or give unit= with frequency=Hz"
+        )
+    if word in _TIME or ((second := parse_unit(unit)) and second.exponents == (0, 0, 1)):
+        raise FileContentError(f"{path} has times in its first column ({name[:40]!r}), no frequencies; {TIME_DATA}")
+    raise FileContentError(_without_heading(path, name))
+
+
+def _name_and_unit(name: str) -> tuple[str, str]:
+    """Return the name of the first column in small letters, and its unit; both empty for anything but words."""
+    text = " ".join(name.split())
+    splits = [text[: place.start()] + "\n" + text[place.end() :] for place in _BETWEEN.finditer(text)]
+    if match := _BRACKETED.fullmatch(text):
+        splits = [f"{match[1]}\n{match[2]}"]
+    found = [split.partition("\n")[::2] for split in (f"\n{text}", *splits, f"{text}\n")]
+    word, unit = next((each for each in found if parse_frequency_unit(each[1]) is not None), found[1])
+    word = word.strip(" ,;:/_.-")
+    return ("", "") if not _WORDS.fullmatch(word) or _LOGARITHM.search(word) else (word.lower(), unit.strip())
+
+
+def _without_heading(path: Path, name: str) -> str:
+    """Say that a table has no heading, and on which line one may follow."""
+    for number, line in enumerate(text_of(path).splitlines()[:_PREAMBLE]):
+        mark = next((each for each in "\t;," if each in line), ",")
+        word, unit = _name_and_unit(line.partition(mark)[0])
+        if _PAIR.search(line) and (word in _FREQUENCY or parse_frequency_unit(unit) is not None):
+            return f"{path} has its heading on line {number + 1}; give skip_lines={number}"
+    return (
+        f"{path} has no heading that names frequencies and channels, but {name[:40]!r}; write one such as "
+        f"'{_HEADING}', or give skip_lines= to leave out a preamble"
+    )
+
+
+class _Column(NamedTuple):
+    """A column: response and excitation, part of the FRF, its unit and quantity in the heading, its numbers."""
+
+    pair: tuple[Channel, Channel]
+    part: str
+    unit: str
+    quantity: str
+    values: NDArray[np.float64] = np.zeros(0)
+
+    @property
+    def name(self) -> str:
+        """The column as messages name it."""
+        return f"{self.part} of {self.pair[0]} / {self.pair[1]}"
+
+
+def _column(name: str, where: str, namer: ChannelNamer) -> _Column:
+    """Read a heading: all that is left without channels, part and words without a meaning is the unit."""
     match = _PAIR.search(name)
     if match is not None:
-        rest = _UNIT.sub(" ", name[: match.start()] + " " + name[match.end() :])
-        named = {_PARTS[word] for word in re.findall(r"[a-z]+", rest.lower()) if word in _PARTS}
-        if len(named) == 1:
+        before, after = name[: match.start()], name[match.end() :]
+        if before.rstrip().endswith("(") and after.lstrip().startswith(")"):  # H(102:+y / 101:+y)
+            before, after = before.rstrip()[:-1], after.lstrip()[1:]
+        rest = " ".join(f"{before} {after}".split())
+        # Behind a bracket and dB only the unit follows, or a part that stands nowhere before: [dB re 1 m/N] mag.
+        named = _parts_in(rest, 0, _UNIT_BEGINS.search(rest)) or _parts_in(rest, _behind_brackets(rest), None)
+        if len({part for part, _ in named}) == 1:
+            part, place = named[0]
             try:
                 pair = namer.channel("heading", match[1]), namer.channel("heading", match[2])
             except ValueError as error:
                 raise FileContentError(f"{where} {error}") from error
-            return pair, named.pop()
+            rest = f"{rest[: place.start()]} {rest[place.end() :]}"
+            quantity = _QUANTITY.search(rest)
+            unit = " ".join(_FILLERS.sub(" ", _QUANTITY.sub(" ", rest)).strip(" ,;:/_-|").split())
+            return _Column(pair, part, _without_in(unit), quantity[1].lower() if quantity else "")
     raise FileContentError(
-        f"{where}: column {name[:60]!r} does not name response / excitation and real, imag, magnitude, phase or "
-        "coherence, such as '102:+y / 101:+y real'"
+        f"{where}: unknown column {name[:60]!r}; name response / excitation and real, imag, magnitude, phase or "
+        "coherence, such as '102:+y / 101:+y real [m/N]'"
     )
 
 
-def _unit_of(name: str) -> str:
-    match = _UNIT.search(name)
-    return match[1].strip() if match else ""
+def _without_in(unit: str) -> str:
+    """Return the unit of a heading without its brackets, or without the word of `real in m/N`, which is no inch."""
+    if match := re.fullmatch(r"[(\[{<]([^()\[\]{}<>]*)[)\]}>]", unit):
+        return match[1].strip()
+    found = parse_unit(unit)
+    return unit if found is not None and found.exponents in QUANTITIES else unit.removeprefix("in ")
+
+
+def _behind_brackets(text: str) -> int:
+    """Return where the text behind the last bracket begins; its end without brackets."""
+    return 1 + max(map(text.rfind, ")]}>")) or len(text)
+
+
+def _parts_in(text: str, start: int, end: re.Match[str] | None) -> list[tuple[str, re.Match[str]]]:
+    """Return the parts of an FRF that words name, and where they stand."""
+    words = _WORD.finditer(text, start, len(text) if end is None else end.start())
+    return [(_PARTS[word[0].lower()], word) for word in words if word[0].lower() in _PARTS]
 
 
 def _functions(
-    pair: tuple[Channel, Channel],
-    columns: dict[str, tuple[str, NDArray[np.float64]]],
-    freq_hz: NDArray[np.float64],
-    where: str,
+    columns: dict[str, _Column], frequency: NDArray[np.float64], stated: str, reading: Reading, where: str
 ) -> list[LooseFunction]:
     """FRF of one pair of channels, and its coherence where there is one."""
-    found = []
+    pair = next(iter(columns.values())).pair
     parts = set(columns) - {"coherence"}
     if parts == {"real", "imag"}:
-        unit, values = columns["real"][0], columns["real"][1] + 1j * columns["imag"][1]
-        if columns["imag"][0] != unit:
+        real, imag = columns["real"], columns["imag"]
+        if real.unit != imag.unit:
             raise FileContentError(f"{where}: real and imag of {pair[0]} / {pair[1]} have different units")
+        unit, values = _one_unit(real, stated, where), real.values + 1j * imag.values
     elif parts == {"magnitude", "phase"}:
-        unit, angle = columns["magnitude"][0], columns["phase"][0].lower()
-        if unit.lower().startswith("db") or angle not in _RADIANS:
-            raise FileContentError(
-                f"{where}: magnitude of {pair[0]} / {pair[1]} must be linear and phase in deg or rad, "
-                f"not [{unit}] and [{angle}]"
-            )
-        values = columns["magnitude"][1] * np.exp(1j * _RADIANS[angle] * columns["phase"][1])
+        magnitude, phase = columns["magnitude"], columns["phase"]
+        unit, size = _linear(magnitude, _one_unit(magnitude, stated, where), reading, where)
+        values = size * np.exp(1j * _radians(phase, reading, where) * phase.values)
     else:
         held = " and ".join(sorted(columns))
         raise FileContentError(
             f"{where} has {held} of {pair[0]} / {pair[1]}: it takes real and imag, or magnitude and phase"
         )
-    found.append(LooseFunction(*pair, freq_hz, values, unit=unit))
+    quantity = next((each.quantity for each in columns.values() if each.quantity), "")
+    found = [LooseFunction(*pair, frequency, values, unit=unit, quantity=quantity)]
     if "coherence" in columns:
-        found.append(LooseFunction(*pair, freq_hz, columns["coherence"][1], is_coherence=True))
+        share = _SHARES.get(columns["coherence"].unit.strip("()[]{}<> "))
+        if share is None:
+            raise FileContentError(f"{where}: unit '{columns['coherence'].unit}' of a coherence; write none, or %")
+        found.append(LooseFunction(*pair, frequency, share * columns["coherence"].values, is_coherence=True))
     return found
+
+
+def _one_unit(column: _Column, stated: str, where: str) -> str:
+    """Return the unit of the heading, or the one that a comment states for all columns."""
+    if column.unit and stated and parse_unit(column.unit) != parse_unit(stated):
+        raise FileContentError(
+            f"{where}: the unit of {column.name} is '{column.unit}', a comment says '{stated}'; correct one of them"
+        )
+    return column.unit or stated
+
+
+def _linear(column: _Column, unit: str, reading: Reading, where: str) -> tuple[str, NDArray[np.float64]]:
+    """Return unit and values of magnitudes, of levels with their reference as the unit."""
+    stated, reference = reading.units.level, parse_level(unit)
+    of_channels = f"of the magnitude of {column.pair[0]} / {column.pair[1]}"
+    if stated and parse_unit(unit) is not None and not reading.forced:
+        raise FileContentError(
+            f"{where}: the unit {of_channels} is '{unit}', not {stated}; leave unit out, or force it"
+        )
+    if not stated and reference is None and re.search(r"db|log", unit, re.IGNORECASE):
+        raise FileContentError(f"{where}: the unit '{unit}' {of_channels} has no reference; give unit='dB re 1 m/N'")
+    if not stated and reference is None:
+        return unit, column.values
+    with np.errstate(over="ignore"):  # infinite values are named later
+        return reference or reading.units.ratio, np.asarray(10.0 ** (column.values / 20.0))
+
+
+def _radians(column: _Column, reading: Reading, where: str) -> float:
+    """Return the unit of phases in rad, the one that the user states or the one of the heading."""
+    by_file = parse_phase_unit(column.unit)
+    try:
+        factor = reading.agreed("phases", parse_phase_unit(reading.units.phase), by_file, column.unit)
+    except ValueError as error:
+        raise FileContentError(f"{where}: {error}") from error
+    if factor is None:
+        why = f"the unit '{column.unit}' is not understood" if column.unit else "there is no unit"
+        raise FileContentError(f"{where}: {why} of the {column.name}; give unit= with phase=deg or phase=rad")
+    return factor
 
 
 def write_csv(path: str | PathLike[str], frfs: FrfSet) -> None:
@@ -249,11 +398,12 @@ def write_csv(path: str | PathLike[str], frfs: FrfSet) -> None:
     write_file(Path(path), "\n".join([*head, ",".join(names), *rows, ""]))
 
 
-def _looks_alike(_: Path, head: bytes) -> bool:
-    """Whether the first line of a text has separators, or is a comment."""
+def _looks_alike(path: Path, head: bytes) -> bool:
+    """Whether a text has the suffix, or its first line has separators or is a comment."""
     first = next((line for line in head.splitlines() if line.strip()), b"")
     is_text = head.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" not in head
-    return is_text and any(mark in first for mark in (b",", b";", b"\t", b"#"))
+    is_named = path.suffix.lower() in (".csv", ".txt")
+    return is_text and (is_named or any(mark in first for mark in (b",", b";", b"\t", b"#")))
 
 
 CSV = FileFormat(

@@ -16,10 +16,14 @@ from jointfrf.files import ReadLimit
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
 from jointfrf.frf.setups import SetUps
 from jointfrf.io.labels import ChannelNamer
-from jointfrf.kernel.arguments import as_nodes, one_line
+from jointfrf.io.units import SAME_FACTOR, StatedUnits
+from jointfrf.kernel.arguments import as_nodes, check_type, one_line
 from jointfrf.spelling import did_you_mean
 
-__all__ = ["FileFormat", "FrfArrays", "FrfMapping", "Reading"]
+__all__ = ["TIME_DATA", "FileFormat", "FrfArrays", "FrfMapping", "Reading"]
+
+#: What to do with time data, to end a sentence.
+TIME_DATA = "estimate FRFs from the time data first, for example with pyFRF"
 
 
 @dataclass(frozen=True)
@@ -117,6 +121,10 @@ class Reading:
         Which field is what.
     is_part : bool
         Whether a file is one of several: coherence without FRFs is enough then.
+    units : StatedUnits
+        Units that the user states.
+    skip_lines : int
+        Lines of a text table before its heading.
     notes : list of str
         What readers assumed or left out, one sentence each.
     """
@@ -127,6 +135,8 @@ class Reading:
     mapping: FrfMapping = FrfMapping()
     is_part: bool = False
     notes: list[str] = field(default_factory=list)
+    units: StatedUnits = field(default_factory=StatedUnits)
+    skip_lines: int = 0
 
     @classmethod
     def checked(
@@ -136,6 +146,9 @@ class Reading:
         nodes: Collection[int] | None = None,
         mapping: Mapping[str, Any] | FrfMapping | None = None,
         is_part: bool = False,
+        *,
+        unit: str = "",
+        skip_lines: int = 0,
     ) -> Reading:
         """Check the arguments of a reader.
 
@@ -147,7 +160,55 @@ class Reading:
         if quantity is not None and quantity not in POWER_OF_I_OMEGA:
             raise ValueError(f"unknown quantity {one_line(quantity)}; use one of {', '.join(POWER_OF_I_OMEGA)}")
         wanted = None if nodes is None else frozenset(as_nodes("nodes", nodes))
-        return cls(quantity, forced, wanted, _as_mapping(mapping), is_part)
+        check_type("unit", unit, str)
+        check_type("skip_lines", skip_lines, int)
+        if skip_lines < 0:
+            raise ValueError(f"skip_lines must be 0 or more, not {skip_lines}")
+        units = StatedUnits.parsed(unit)
+        if quantity and units.quantity not in ("", quantity):
+            raise ValueError(f"unit {units.frf} is one of {units.quantity}, not {quantity}; correct one of them")
+        quantity = quantity or units.quantity or None
+        return cls(quantity, forced, wanted, _as_mapping(mapping), is_part, units=units, skip_lines=skip_lines)
+
+    @property
+    def options(self) -> dict[str, str]:
+        """What the user states beside the quantity, by name, as messages name it."""
+        named = {each.name: f"mapping {each.name}=" for each in fields(self.mapping)
+                 if getattr(self.mapping, each.name) is not None}  # fmt: skip
+        units = {each.name: f"unit {each.name}=" for each in fields(self.units)
+                 if each.name != "frf" and getattr(self.units, each.name)}  # fmt: skip
+        level = {"level": f"unit {self.units.frf}"} if self.units.level else {}
+        return named | units | level | ({"skip_lines": "skip_lines="} if self.skip_lines else {})
+
+    def check_options(self, taken: Collection[str] | None, names: str) -> None:
+        """Raise ValueError for an option that no file takes."""
+        idle = [text for name, text in self.options.items() if taken is not None and name not in taken]
+        if idle:
+            have = "has" if len(idle) == 1 else "have"
+            raise ValueError(f"{' and '.join(idle)} {have} no effect on {names}; leave it out")
+
+    def agreed(self, what: str, stated: float | None, found: float | None, label: str) -> float | None:
+        """Return the factor to SI of a unit: the one that the user states, else the one of the file.
+
+        Parameters
+        ----------
+        what : str
+            Quantity whose unit it is, for the message.
+        stated, found : float or None
+            Factors that the user states and that the file gives.
+        label : str
+            Unit in the file.
+
+        Raises
+        ------
+        ValueError
+            Both differ, and nothing is forced.
+        """
+        if stated is None or found is None:
+            return found if stated is None else stated
+        if abs(stated / found - 1.0) > SAME_FACTOR and not self.forced:
+            raise ValueError(f"the unit of the {what} is '{label}', not the one of unit=; leave unit out, or force it")
+        return stated
 
     def warn(self) -> None:
         """Warn of every note; to be called by a public function."""
@@ -206,6 +267,8 @@ class FrfArrays:
     coordinates: Mapping[int, NDArray[np.float64]] = field(default_factory=dict)
     setups: SetUps | None = None
     notes: list[str] = field(default_factory=list)
+    frequency_unit: str = ""  #: Hz by default
+    takes: Collection[str] | None = None  #: as of `FileFormat`
 
 
 def _never(*_: object) -> bool:
@@ -238,6 +301,8 @@ class FileFormat:
         What writing needs beside the requirements of the installation, a name of `extras`.
     keeps_setups : bool
         Whether such a file holds which FRF came from which set-up.
+    takes : collection of str, optional
+        Names of `Reading.options` that have an effect on such a file; None: all. `FrfArrays.takes` narrows it.
     """
 
     name: str
@@ -250,3 +315,4 @@ class FileFormat:
     needs: str = ""
     package: str = ""
     keeps_setups: bool = False
+    takes: Collection[str] | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
@@ -22,7 +22,7 @@ from jointfrf.frf.merge import merge_frfs
 from jointfrf.io.arrays import as_frf_set
 from jointfrf.io.file_format import FileFormat, FrfArrays, FrfMapping, Reading
 
-__all__ = ["FORMATS", "check_suffix", "format_names", "read_frfs", "write_frfs"]
+__all__ = ["FORMATS", "check_suffix", "format_names", "read_frf_sets", "read_frfs", "write_frfs"]
 
 #: The modules of the formats. The order counts where a file has no mark, and for MATLAB 7.3, which is HDF5 inside.
 _MODULES = (
@@ -46,12 +46,15 @@ FORMATS = tuple(map(_format_of, _MODULES))
 _PLUGINS = "jointfrf.formats"
 #: Why a pickle is an error.
 _PICKLE = "is a pickle, which could run any program; save an NPZ file"
+#: What to do with files of LabVIEW.
+_FRFS_WANTED = ", which is not read; export its FRFs as a Universal File or CSV"
 #: First bytes of files that are not read, and what the user can do.
 _OTHERS = (
     (b"\x93NUMPY", "is an NPY file, one array without frequencies; save an NPZ file, or use frfs_of_arrays"),
     *((b"\x80" + bytes([protocol]), _PICKLE) for protocol in (2, 3, 4, 5)),
     (b"\x1f\x8b", "is compressed by gzip; unpack it"),
-    (b"TDSm", "is a TDMS file: export a Universal File"),
+    (b"TDSm", f"is a TDMS file of LabVIEW{_FRFS_WANTED}"),
+    (b"LabVIEW Measurement", f"is an LVM file of LabVIEW{_FRFS_WANTED}"),
 )
 
 
@@ -135,6 +138,8 @@ def read_frfs(
     mapping: Mapping[str, Any] | FrfMapping | None = None,
     averages: ArrayLike | None = None,
     limit_gb: float | None = None,
+    unit: str = "",
+    skip_lines: int = 0,
 ) -> FrfSet:
     """Read measured FRFs from one file or several of one test.
 
@@ -146,7 +151,7 @@ def read_frfs(
     quantity : {"receptance", "mobility", "accelerance"}, optional
         What the FRFs are, where the files do not say it.
     force_quantity : bool
-        Take `quantity` also where a file says something else.
+        Take `quantity` and `unit` also if a file states something else.
     nodes : collection of int, optional
         Only FRFs between these nodes.
     mapping : mapping, optional
@@ -158,6 +163,12 @@ def read_frfs(
     limit_gb : float, optional
         Largest size of one file, and of its content in memory, GB. Default: the environment variable
         JOINTFRF_FILE_LIMIT_GB, or else 16 GB of file, and 1 GB, or 10 times the size of the file, of content.
+    unit : str
+        Unit of the FRFs, if the files do not state it or state it in a way that is not understood: ``g/N``,
+        ``mm/kN``, ``dB re 1 m/N`` (magnitudes of text tables). Other units with their names, between commas:
+        ``g/N, frequency=kHz, phase=rad, coordinates=mm``.
+    skip_lines : int
+        Number of lines before the heading of a text table, default 0.
 
     Returns
     -------
@@ -170,16 +181,17 @@ def read_frfs(
     FileNotFoundError
         There is no such file.
     FileContentError
-        A file is of an unknown format, damaged, lacks something, or contradicts `quantity` or another file.
+        A file is of an unknown format, damaged, lacks something such as a unit, or contradicts `quantity`, `unit` or
+        another file.
     MissingPackageError
         A package for the format is not installed.
     ValueError
-        An argument is wrong.
+        An argument is wrong, or has no effect on any of the files.
 
     Warns
     -----
     FileContentWarning
-        Something had to be assumed or left out.
+        Something was left out.
 
     Examples
     --------
@@ -187,10 +199,10 @@ def read_frfs(
     >>> frfs = jointfrf.io.read_frfs("hammer.mat", mapping={"h": "FRF", "axes": "out,in,freq"})  # doctest: +SKIP
     >>> print(frfs)  # doctest: +SKIP
     """
-    reading = Reading.checked(quantity, force_quantity, nodes, mapping, len(paths) > 1)
-    if not paths:
-        raise ValueError("no file is named")
-    sets = [_read(Path(path), reading, limit_gb) for path in paths]
+    reading = Reading.checked(
+        quantity, force_quantity, nodes, mapping, len(paths) > 1, unit=unit, skip_lines=skip_lines
+    )
+    sets = _read_all(paths, reading, limit_gb)
     reading.warn()
     merged = merge_frfs(sets)
     if not merged.measured.any():
@@ -198,15 +210,48 @@ def read_frfs(
     return merged if averages is None else replace(merged, averages=np.asarray(averages))
 
 
-def _read(path: Path, reading: Reading, limit_gb: float | None) -> FrfSet:
-    """Read one file."""
-    found = _detected(path, head_of(path, limit_gb)).read(path, ReadLimit(path, limit_gb), reading)
+def read_frf_sets(
+    *paths: str | PathLike[str],
+    quantity: str | None = None,
+    force_quantity: bool = False,
+    mapping: Mapping[str, Any] | FrfMapping | None = None,
+    unit: str = "",
+    skip_lines: int = 0,
+) -> list[FrfSet]:
+    """Read FRFs of several structures, a set of each file; arguments and errors are those of `read_frfs`."""
+    reading = Reading.checked(quantity, force_quantity, None, mapping, unit=unit, skip_lines=skip_lines)
+    sets = _read_all(paths, reading, None)
+    reading.warn()
+    for one in sets:
+        if not one.measured.any():
+            raise FileContentError(f"{one.source}: there is no FRF")
+    return sets
+
+
+def _read_all(paths: Sequence[str | PathLike[str]], reading: Reading, limit_gb: float | None) -> list[FrfSet]:
+    """Read files; raise for what the user states without effect on any of them."""
+    if not paths:
+        raise ValueError("no file is named")
+    sets, taken = [], set[str]()
+    for path in map(Path, paths):
+        found, takes = _read(path, reading, limit_gb)
+        sets.append(found)
+        taken |= set(reading.options if takes is None else takes)
+    reading.check_options(taken, ", ".join(map(str, paths)))
+    return sets
+
+
+def _read(path: Path, reading: Reading, limit_gb: float | None) -> tuple[FrfSet, Collection[str] | None]:
+    """Read one file; return also the options that it takes."""
+    kind = _detected(path, head_of(path, limit_gb))
+    found, takes = kind.read(path, ReadLimit(path, limit_gb), reading), kind.takes
     if isinstance(found, FrfArrays):
+        takes = kind.takes if found.takes is None else found.takes
         found = as_frf_set(found, str(path), reading)
         found = found if reading.nodes is None else found.at_nodes(reading.nodes)
     if not isinstance(found, FrfSet):  # of a plugin
         raise FileContentError(f"{path}: its reader returned a {type(found).__name__}, no FrfArrays and no FrfSet")
-    return found
+    return found, takes
 
 
 def _detected(path: Path, head: bytes) -> FileFormat:

@@ -15,7 +15,7 @@ from jointfrf.frf.frf_set import Channel
 from jointfrf.frf.merge import same_lines
 from jointfrf.io.file_format import FrfArrays, FrfMapping
 from jointfrf.io.labels import ChannelNamer
-from jointfrf.io.units import parse_unit
+from jointfrf.io.units import SAME_FACTOR, parse_frequency_unit, parse_unit, si_label
 from jointfrf.spelling import some_of
 
 __all__ = [
@@ -27,8 +27,6 @@ __all__ = [
     "repetition_note",
 ]
 
-#: How far the factor to SI of a file may be from that of its unit, relative to it: files give four digits or more.
-_SAME_FACTOR = 1e-3
 #: The function type of FRFs in sdynpy, as in Universal Files.
 _FRF = 4
 #: Beginnings of the types of FRFs, and types of ordinary coherence, in Testlab: letters and digits in lower case.
@@ -49,6 +47,7 @@ class LooseFunction(NamedTuple):
     is_coherence: bool = False
     unit: str = ""
     quantity: str = ""
+    frequency_unit: str = ""
 
     def __str__(self) -> str:
         return f"{'coherence' if self.is_coherence else 'FRF'} {self.response} / {self.excitation}"
@@ -92,8 +91,8 @@ def arrays_of_functions(functions: Sequence[LooseFunction], where: str, limit: R
             if is_first and each.response in row_of and each.excitation in column_of:
                 coherence[:, row_of[each.response], column_of[each.excitation]] = each.values
             continue
-        if (each.unit, each.quantity) != (first.unit, first.quantity):
-            said = [" ".join(filter(None, (one.quantity, f"[{one.unit or 'no unit'}]"))) for one in (first, each)]
+        if each[5:] != first[5:]:
+            said = [f"{one.quantity} [{one.unit or 'no unit'}]".strip() for one in (first, each)]
             raise FileContentError(f"{where}: {first} is {said[0]}, {each} is {said[1]}; export them alike")
         place = (slice(None), row_of[each.response], column_of[each.excitation])
         if is_first:
@@ -103,8 +102,9 @@ def arrays_of_functions(functions: Sequence[LooseFunction], where: str, limit: R
     known = None if np.isnan(coherence).all() else coherence
     notes = [repetition_note(*max(again), len(again))] if again else []
     return FrfArrays(
-        first.freq_hz, h, "freq,out,in", responses, excitations, first.quantity, first.unit, known, notes=notes
-    )
+        first.freq_hz, h, "freq,out,in", responses, excitations, first.quantity, first.unit, known, notes=notes,
+        frequency_unit=first.frequency_unit,
+    )  # fmt: skip
 
 
 def difference_of(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> float:
@@ -157,6 +157,7 @@ class _Column(NamedTuple):
     unit: str
     response: str | None
     excitation: str | None
+    frequency_unit: str
 
 
 def functions_of_testlab(fields: Any, mapping: FrfMapping, where: str) -> tuple[list[LooseFunction], list[str]] | None:
@@ -177,7 +178,7 @@ def functions_of_testlab(fields: Any, mapping: FrfMapping, where: str) -> tuple[
     is_export = False
     for record in _records(fields):
         is_export = True
-        columns += _columns(record, mapping, where, others)
+        columns += _columns(record, where, others)
     if not is_export:
         return None
     left_out = some_of([f"{count} of type {name}" for name, count in others.items()], _SHOWN)
@@ -208,7 +209,10 @@ def _named(columns: Sequence[_Column], mapping: FrfMapping, namer: ChannelNamer,
         except ValueError as error:
             raise FileContentError(f"{where} {error}") from error
     for response, excitation, each in zip(*sides, columns, strict=True):
-        yield LooseFunction(response, excitation, each.freq_hz, each.values, each.is_coherence, each.unit)
+        yield LooseFunction(
+            response, excitation, each.freq_hz, each.values, each.is_coherence, each.unit,
+            frequency_unit=each.frequency_unit,
+        )  # fmt: skip
 
 
 def _records(content: Any) -> Iterator[Mapping[str, Any]]:
@@ -224,7 +228,7 @@ def _records(content: Any) -> Iterator[Mapping[str, Any]]:
             yield from _records(value)
 
 
-def _columns(record: Mapping[str, Any], mapping: FrfMapping, where: str, others: Counter[str]) -> Iterator[_Column]:
+def _columns(record: Mapping[str, Any], where: str, others: Counter[str]) -> Iterator[_Column]:
     """FRFs and coherences of one structure, which holds a column for each; other functions are counted."""
     about = record.get("function_record")
     about = about if isinstance(about, Mapping | list) else {}
@@ -253,10 +257,11 @@ def _columns(record: Mapping[str, Any], mapping: FrfMapping, where: str, others:
             others[kind] += 1
             continue
         if kind != "coherence" and not unit:
-            unit = _unit(y_values, mapping, where)
-        labels = (None if own is None else own[i] for own in names)
+            unit = _unit(y_values)
+        response, excitation = (None if own is None else own[i] for own in names)
         is_coherence = kind == "coherence"
-        yield _Column(freq_hz, columns[:, i], is_coherence, "" if is_coherence else unit, *labels)
+        own_unit = "" if is_coherence else unit
+        yield _Column(freq_hz, columns[:, i], is_coherence, own_unit, response, excitation, _frequency_unit(x_values))
 
 
 def _kind(name: str) -> str:
@@ -309,23 +314,36 @@ def _lines(x_values: Mapping[str, Any], values: NDArray[Any], where: str) -> NDA
     return np.asarray(start + step * np.arange(size)) if "increment" in x_values else given
 
 
-def _unit(y_values: Mapping[str, Any], mapping: FrfMapping, where: str) -> str:
-    """Return the unit of the values: the label, unless the file gives a factor that says otherwise."""
-    if mapping.unit is not None:
-        return mapping.unit
-    quantity = y_values.get("quantity")
-    quantity = quantity if isinstance(quantity, Mapping) else {}
-    label = (_texts(quantity.get("label")) or [""])[0].strip()
-    transformation = quantity.get("unit_transformation")
-    factor = transformation.get("factor", 1.0) if isinstance(transformation, Mapping) else 1.0
+def _unit(y_values: Mapping[str, Any]) -> str:
+    """Return the unit of the values.
+
+    The label is the unit in which Testlab shows them. They are saved in SI (MKS), and the factor goes from there to the
+    label: 0.101972 of g. If label, factor and text disagree, the label that is returned is not understood.
+    """
+    quantity, label = _axis(y_values)
     unit = parse_unit(label)
-    to_si = float(np.ravel(factor)[0])
-    if unit is not None and not any(abs(to_si / sound - 1) < _SAME_FACTOR for sound in (1.0, unit.to_si)):
-        raise FileContentError(
-            f"{where} gives the unit '{label}' with the factor {to_si:g}: whether the values are in that unit or in SI "
-            "units is not clear; say unit= by mapping, the unit of the values"
-        )
-    return label
+    if unit is None:
+        return label
+    transformation = quantity.get("unit_transformation")
+    given = transformation.get("factor") if isinstance(transformation, Mapping) else None
+    is_mks = "MKS" in " ".join(_texts(quantity.get("info"))).upper()
+    if given is None and not is_mks:
+        return label if unit.to_si == 1.0 else f"{label}, no factor"
+    factor = 1.0 / unit.to_si if given is None else float(np.ravel(given)[0])
+    return si_label(unit.exponents) if abs(factor * unit.to_si - 1.0) < SAME_FACTOR else f"{label}, factor {factor:g}"
+
+
+def _frequency_unit(x_values: Mapping[str, Any]) -> str:
+    """Return the unit of the frequencies; any other than Hz, which need not be the one of the values, with a word."""
+    _, label = _axis(x_values)
+    return label if not label or parse_frequency_unit(label) == 1.0 else f"{label}, saved in MKS"
+
+
+def _axis(values: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
+    """Return the description of an axis, and its label."""
+    quantity = values.get("quantity")
+    quantity = quantity if isinstance(quantity, Mapping) else {}
+    return quantity, (_texts(quantity.get("label")) or [""])[0].replace("\0", " ").strip()
 
 
 def _point_names(channel: Any, n: int) -> list[str] | None:

@@ -16,6 +16,7 @@ from jointfrf.files import ReadLimit, check_file, damage_named, head_of
 from jointfrf.io.npz_file import npz_fields
 from jointfrf.io.uff_axes import node_axes
 from jointfrf.io.uff_file import UniversalFile, name_some
+from jointfrf.io.units import ModelUnits
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["ModesFile", "read_modes"]
@@ -89,7 +90,7 @@ class ModesFile:
         return self.frequency < _RIGID_HZ
 
 
-def read_modes(path: Path, limit_gb: float | None = None) -> ModesFile:
+def read_modes(path: Path, limit_gb: float | None = None, units: ModelUnits | None = None) -> ModesFile:
     """Read modes.
 
     Parameters
@@ -98,11 +99,13 @@ def read_modes(path: Path, limit_gb: float | None = None) -> ModesFile:
         A Universal File with datasets 55 or 2414 of modes, or an NPZ file.
     limit_gb : float, optional
         As for `jointfrf.io.read_frfs`.
+    units : ModelUnits, optional
+        Units of a Universal File without dataset 164.
 
     Raises
     ------
     FileContentError
-        It cannot be read, or holds no modes whose scale is known.
+        It cannot be read, has no units, or holds no modes whose scale is known.
     """
     check_file(path, limit_gb)
     head, limit = head_of(path, limit_gb), ReadLimit(path, limit_gb)
@@ -110,7 +113,7 @@ def read_modes(path: Path, limit_gb: float | None = None) -> ModesFile:
         found = _of_arrays(path, npz_fields(path, limit))
     else:
         limit.take(12 * path.stat().st_size)  # lines, words and numbers of text
-        found = _of_universal(UniversalFile(path))
+        found = _of_universal(UniversalFile(path), units)
     _check(path, found)
     return found
 
@@ -130,7 +133,7 @@ def _check(path: Path, found: ModesFile) -> None:
         raise FileContentError(f"{path} contains negative modal masses")
 
 
-def _of_universal(file: UniversalFile) -> ModesFile:
+def _of_universal(file: UniversalFile, units: ModelUnits | None) -> ModesFile:
     """Return the modes of a Universal File, in SI units."""
     modes = []
     for number in file.datasets(55, 2414):
@@ -140,14 +143,14 @@ def _of_universal(file: UniversalFile) -> ModesFile:
         if mode is None or mode.get("is_conjugate"):  # conjugates are added anyway
             continue
         system = file.unit_system(number)
+        system = units.system if system is None and units is not None else system
         if system is None:
-            file.note("modes have no unit (there is no dataset 164): m, kg, s are assumed", number)
-        else:
-            # Shapes are motions, modal masses and modal A twice a kinetic energy: kg m^2.
-            length, force = 1 / system.length, 1 / system.force
-            mode["shape"] = {dof: value * (length if dof.rpartition(":")[2] in DIRECTIONS[:3] else 1.0)
-                             for dof, value in mode["shape"].items()}  # fmt: skip
-            mode["scale"] *= force * length
+            raise file.error("has modes without units (there is no dataset 164); give units=SI, mm-t-s or mm-kg-ms")
+        # Shapes are motions, modal masses and modal A twice a kinetic energy: kg m^2.
+        length, force = 1 / system.length, 1 / system.force
+        mode["shape"] = {dof: value * (length if dof.rpartition(":")[2] in DIRECTIONS[:3] else 1.0)
+                         for dof, value in mode["shape"].items()}  # fmt: skip
+        mode["scale"] *= force * length
         modes.append(mode)
     if not modes:
         raise file.error("contains no modes: no dataset 55 or 2414 of normal or complex modes")

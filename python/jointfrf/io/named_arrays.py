@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import fields as dataclass_fields
 from itertools import islice
 from typing import Any
 
@@ -15,7 +16,7 @@ from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, ROUND_OFF, Channel, FrfSet
 from jointfrf.frf.setups import SetUps
-from jointfrf.io.file_format import FrfArrays, FrfMapping
+from jointfrf.io.file_format import TIME_DATA, FrfArrays, FrfMapping
 from jointfrf.io.functions import LooseFunction, arrays_of_functions, functions_of_sdynpy, functions_of_testlab
 from jointfrf.kernel.arguments import as_array, check_type, one_line
 from jointfrf.spelling import some_of
@@ -54,6 +55,10 @@ _KNOWN = {
     "coherence": ("coherence", "coh", "gamma2", "coherences"),
     "averages": ("averages", "n_averages", "navg", "n_avg", "number_of_averages"),
 }  # fmt: skip
+#: Options that have an effect on functions one by one, and on arrays that are found by their names.
+_TAKEN_BY_SDYNPY = ("direction", "components")
+_TAKEN_BY_TESTLAB = ("responses", "excitations", *_TAKEN_BY_SDYNPY)
+_TAKEN_BY_ARRAYS = (*(each.name for each in dataclass_fields(FrfMapping)), "frequency")
 #: Fields with parts of FRFs, by which the user may name these.
 _PARTS = ("real", "imag", "magnitude", "phase_deg", "phase_rad")
 #: Frequencies that the user gives: a list of numbers, or first one and spacing.
@@ -63,6 +68,8 @@ _SHOWN, _NAME = 12, 30
 #: Names of FRFs that say their quantity, and of frequencies in rad/s.
 _QUANTITIES = ("accelerance", "inertance", "mobility", "receptance")
 _RADIANS = ("omega", "w")
+#: Names of times, which files of FRFs do not have.
+_TIMES = ("t", "time", "times", "time_s")
 
 
 def arrays_of_fields(
@@ -96,6 +103,7 @@ def arrays_of_fields(
     if functions:
         found = arrays_of_functions(functions, where, limit)
         found.notes[:0] = notes
+        found.takes = _TAKEN_BY_SDYNPY if exported is None else _TAKEN_BY_TESTLAB
         return found
     return _mapped_arrays(fields, mapping, where, limit)
 
@@ -222,11 +230,12 @@ def _own_arrays(fields: Mapping[str, Any], where: str) -> FrfArrays:
         fields["responses"],
         fields["excitations"],
         str(fields["quantity"]),
-        str(fields.get("unit", "")),
+        str(fields.get("unit") or _UNITS[POWER_OF_I_OMEGA.get(str(fields["quantity"]), 0)]),
         fields.get("coherence"),
         fields.get("averages"),
         {int(node): place.astype(np.float64) for node, place in zip(nodes.ravel(), places, strict=True)},
         _setups_of(fields, where),
+        takes=(),
     )
 
 
@@ -234,6 +243,9 @@ def _mapped_arrays(content: Mapping[str, Any], mapping: FrfMapping, where: str, 
     """FRFs by the names of fields."""
     flat = dict(_flattened(content))
     found = {name: _field(flat, name, getattr(mapping, name), where) for name in _KNOWN}
+    times = [path for path in flat if path.rpartition(".")[2].lower() in _TIMES]
+    if times and found["h"] is None and not mapping.names_frfs:
+        raise FileContentError(f"{where} has times ({times[0]}) and no FRFs; {TIME_DATA}")
     if found["freq_hz"] is None:
         raise FileContentError(
             f"{where} has no field for the frequencies; give mapping freq_hz=..., a field out of {_names(flat)}, or "
@@ -252,10 +264,22 @@ def _mapped_arrays(content: Mapping[str, Any], mapping: FrfMapping, where: str, 
         _text(found["unit"]),
         _value(found["coherence"]),
         _value(found["averages"]),
+        frequency_unit=_frequency_unit(found["freq_hz"][0]),
+        takes=_TAKEN_BY_ARRAYS,
     )
     number = _number_of_functions(arrays)
     arrays.freq_hz = _frequencies(found["freq_hz"], flat, arrays, number, where)
-    return arrays if number is None else _one_by_one(arrays, mapping, number, where, limit)
+    if number is None:
+        return arrays
+    found_one_by_one = _one_by_one(arrays, mapping, number, where, limit)
+    found_one_by_one.takes = _TAKEN_BY_ARRAYS
+    return found_one_by_one
+
+
+def _frequency_unit(path: str) -> str:
+    """Return the unit that the name of a field of frequencies states; empty: Hz, unless the user states another."""
+    name = path.rpartition(".")[2].lower()
+    return "rad/s" if name in _RADIANS else "Hz" if "hz" in name else ""
 
 
 def _frfs(
@@ -320,6 +344,7 @@ def _one_by_one(arrays: FrfArrays, mapping: FrfMapping, number: int, where: str,
                     is_coherence,
                     arrays.unit,
                     arrays.quantity,
+                    arrays.frequency_unit,
                 )
                 for response, excitation, column in zip(arrays.responses, arrays.excitations, columns, strict=True)
             ]
@@ -331,12 +356,10 @@ def _one_by_one(arrays: FrfArrays, mapping: FrfMapping, number: int, where: str,
 def _frequencies(
     found: tuple[str, Any], flat: Mapping[str, Any], arrays: FrfArrays, number: int | None, where: str
 ) -> Any:
-    """Frequencies in Hz: those of a field, those that the user lists, or first one and spacing."""
+    """Frequencies, of a field in its own unit: those of a field, those that the user lists, or first and spacing."""
     path, values = found
     if path or not isinstance(values, str):
-        freq_hz = np.asarray(values)
-        is_radians = path.rpartition(".")[2].lower() in _RADIANS and freq_hz.dtype.kind in "iuf"
-        return freq_hz / (2 * np.pi) if is_radians else freq_hz
+        return np.asarray(values)
     if ":" not in values:
         return np.array([_one_number(word, flat, where) for word in values.split(",")])
     start, step, *end = (_one_number(word, flat, where) for word in values.split(":"))

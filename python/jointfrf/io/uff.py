@@ -18,7 +18,7 @@ from jointfrf.files import HEAD, ReadLimit, head_of, write_file
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, ROUND_OFF, Channel, FrfSet, same_frf
 from jointfrf.frf.merge import same_lines
 from jointfrf.io.arrays import contradiction, finite_frfs
-from jointfrf.io.file_format import FileFormat, Reading
+from jointfrf.io.file_format import TIME_DATA, FileFormat, Reading
 from jointfrf.io.functions import difference_of, repetition_note
 from jointfrf.io.labels import DIRECTION_CODES, ChannelNamer
 from jointfrf.io.uff_axes import NodeAxes, global_channels, node_axes, node_coordinates
@@ -35,13 +35,14 @@ from jointfrf.io.uff_function import (
     place_fields,
     read_header,
 )
+from jointfrf.io.units import parse_frequency_unit
 from jointfrf.kernel.arguments import check_type
 from jointfrf.spelling import some_of
 
 __all__ = ["UNIVERSAL_FILE", "read_uff", "write_uff"]
 
 #: Function types of dataset 58.
-_FRF, _COHERENCE = 4, 6
+_TIME_HISTORY, _FRF, _COHERENCE = 1, 4, 6
 #: Values of a measurement span fewer decades; with their bytes in the wrong order they span hundreds.
 _MOST_DECADES = 60
 #: Different kinds of ordinates that a set names.
@@ -52,8 +53,6 @@ _WIDTH = 80
 _CODES = {direction: code for code, direction in DIRECTION_CODES.items()}
 #: Records of the axes of a coherence, which has no unit.
 _COHERENCE_AXES = [axis_record(0, "Coherence", "NONE"), axis_record(0, "NONE", "NONE")]
-#: Factors to Hz of units of the abscissa.
-_HZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi, "rad/sec": 0.5 / np.pi, "rpm": 1.0 / 60.0}
 
 
 _Number = TypeVar("_Number", np.float64, np.complex128)
@@ -110,6 +109,7 @@ def read_uff(
     force_quantity: bool = False,
     nodes: Collection[int] | None = None,
     limit_gb: float | None = None,
+    unit: str = "",
 ) -> FrfSet:
     """Read the FRFs of a Universal File.
 
@@ -121,10 +121,10 @@ def read_uff(
         What every FRF of the file is, where its data types do not say it or contradict its units. Default: by the
         file.
     force_quantity : bool
-        Take `quantity` also where data types and units of the file agree on another one.
+        Take `quantity` and `unit` also if data types and units of the file agree on another one.
     nodes : collection of int, optional
         Read only FRFs between these nodes; all by default. Headers are read first, and then only what is wanted.
-    limit_gb : float, optional
+    limit_gb, unit : optional
         As for `read_frfs`.
 
     Returns
@@ -139,21 +139,21 @@ def read_uff(
     FileNotFoundError
         There is no such file.
     FileContentError
-        The file cannot be read, lacks something, or contradicts `quantity`; the message says what, and in which
-        dataset, counted from 1.
+        The file cannot be read, lacks something such as a unit, or contradicts `quantity` or `unit`; the message says
+        what, and in which dataset, counted from 1.
 
     Warns
     -----
     FileContentWarning
-        Something was assumed or left out; each is reported once, with its datasets. Left out are a dataset
-        that the end of the file cuts short, FRFs without node or direction, of unknown kind or not of motion per force
-        (if no others remain, that is an error), further FRFs between the same channels, a line at 0 Hz that is not a
-        number, local coordinates, FRFs in local directions that cannot be turned. Assumed are units.
+        Something was left out; each is reported once, with its datasets. Left out are a dataset that the end of the
+        file cuts short, FRFs without node or direction, of unknown kind or not of motion per force (if no others
+        remain, that is an error), further FRFs between the same channels, a line at 0 Hz that is not a number, local
+        coordinates, coordinates without a unit, FRFs in local directions that cannot be turned.
 
     Notes
     -----
-    Units come from the labels of dataset 58 where they are understood. Otherwise the values are divided by the length
-    and force factors of dataset 164, as its definition [1]_ says; coordinates always are.
+    Units come from the labels of dataset 58. If there are none, the values are divided by the length and force factors
+    of dataset 164, as its definition [1]_ says; coordinates always are. A label that is not understood is an error.
 
     Directions of nodes with a displacement system of their own (datasets 15, 2411, 18, 2420) become global ones. Axes
     along global ones rename the channels. Others need all three directions of a node, as responses or as forces.
@@ -169,7 +169,8 @@ def read_uff(
     >>> frfs = jointfrf.io.read_uff("lap_joint.uff")  # doctest: +SKIP
     >>> h = frfs.receptance().matrix(["102:+y", "202:+y"], ["102:+y", "202:+y"])  # doctest: +SKIP
     """
-    reading = Reading.checked(quantity, force_quantity, nodes)
+    reading = Reading.checked(quantity, force_quantity, nodes, unit=unit)
+    reading.check_options(UNIVERSAL_FILE.takes, str(path))
     file = Path(path)
     head_of(file, limit_gb)
     found = _read(file, ReadLimit(file, limit_gb), reading)
@@ -179,7 +180,7 @@ def read_uff(
 
 def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfSet:
     """Read the FRFs of a file; where it is one of several, coherences alone are enough, and FRFs are then NaN."""
-    file = UniversalFile(path)
+    file = UniversalFile(path, reading)
     content = _describe(file, reading)
     only_coherence = reading.is_part and not content.frfs and not content.unusable and content.coherences
     if not content.frfs and not only_coherence:
@@ -311,7 +312,8 @@ def _no_frf(file: UniversalFile, content: _Content, nodes: Collection[int] | Non
         return file.error(f"holds no FRF that can be used: {why}")
     if _FRF in content.functions and nodes is not None:
         return file.error(f"holds no FRF between {name_some('node', sorted(nodes))}")
-    return file.error(f"holds {file.held_without_frf(content.functions)}")
+    times = f"; {TIME_DATA}" if _TIME_HISTORY in content.functions else ""
+    return file.error(f"holds {file.held_without_frf(content.functions)}{times}")
 
 
 def _describe_frf(
@@ -338,7 +340,7 @@ def _describe_frf(
     if found is None:
         raise _UnusableFrfError(f"its data types {numerator} per {denominator} do not say what it is; give quantity=")
     try:
-        factor = ordinate_factor(
+        by_file, why = ordinate_factor(
             numerator,
             denominator,
             channels,
@@ -349,10 +351,32 @@ def _describe_frf(
         )
     except ValueError as error:
         raise file.error(f"contradicts itself in dataset {number}: {error}; give quantity=") from error
+    factor = _agreed_factor(file, number, channels, by_file, f"{numerator.label}' / '{denominator.label}")
+    if factor is None:
+        raise file.error(f"cannot be scaled: {why} (dataset {number}); give unit=, such as g/N or (m/s^2)/N")
     if not 0.0 < factor < np.inf:
         raise file.error(f"has a unit in dataset {number} that cannot be converted to SI")
     stated = f"{numerator.words} per {denominator.words}"
+    stated += f", unit stated: {file.reading.units.frf}" if file.reading.units.frf else ""
     return _Frf(number, header, channels, found, factor, stated)
+
+
+def _agreed_factor(
+    file: UniversalFile, number: int, channels: tuple[Channel, Channel], by_file: float | None, label: str
+) -> float | None:
+    """Factor to SI by the unit that the user states for translations per force, and by the file."""
+    stated = file.reading.units.frf_to_si
+    if stated is not None and any(channel.is_rotation for channel in channels):
+        if by_file is None and stated != 1.0:
+            raise file.error(
+                f"has a rotation in dataset {number} ({channels[0]} / {channels[1]}), of which unit= is no unit; give "
+                "SI units"
+            )
+        return by_file or 1.0
+    try:
+        return file.reading.agreed("FRFs", stated, by_file, label)
+    except ValueError as error:
+        raise file.error(f"(dataset {number}): {error}") from error
 
 
 def _check_form(file: UniversalFile, number: int, header: FunctionHeader) -> None:
@@ -496,15 +520,27 @@ def _read_function(
         raise file.error(f"is damaged: dataset {dataset} ({name}) holds {value.size} of {n} values")
     if header.is_binary and _is_scrambled(value):
         raise file.error(f"is damaged: in dataset {dataset} ({name}) the byte order is not the one that is stated")
-    kind, label = header.abscissa.data_type, header.abscissa.label.lower()
-    if kind not in (0, 1, 18):
-        raise file.error(f"gives dataset {dataset} ({name}) over {header.abscissa.name}, not frequency")
-    if label not in _HZ or (not label and kind != 18):
-        file.note(f"the unit '{label}' of the frequencies is not known: Hz is assumed", dataset)
-    freq_hz = lines[:n] * _HZ.get(label, 1.0)
+    freq_hz = lines[:n] * _hertz(file, dataset, header, name)
     if not np.isfinite(freq_hz).all() or freq_hz[0] < 0.0 or (np.diff(freq_hz) <= 0.0).any():
         raise file.error(f"is damaged: the frequencies of dataset {dataset} ({name}) do not increase from 0 Hz or more")
     return freq_hz, np.array(value[:n], dtype=dtype)
+
+
+def _hertz(file: UniversalFile, dataset: int, header: FunctionHeader, name: str) -> float:
+    """Return the unit of the abscissa in Hz, the one that the user states or the one of the file."""
+    kind, label = header.abscissa.data_type, header.abscissa.label
+    if kind not in (0, 1, 18):
+        raise file.error(f"gives dataset {dataset} ({name}) over {header.abscissa.name}, not frequency")
+    # Time is in s in every Universal File, so that a frequency without a label is in Hz.
+    found = parse_frequency_unit("Hz" if not label and kind == 18 else label)
+    try:
+        factor = file.reading.agreed("frequencies", parse_frequency_unit(file.reading.units.frequency), found, label)
+    except ValueError as error:
+        raise file.error(f"(dataset {dataset}): {error}") from error
+    if factor is None:
+        why = f"the unit '{label}' of the frequencies is not understood" if label else "the frequencies have no unit"
+        raise file.error(f"cannot be scaled: {why} (dataset {dataset}); give unit= with frequency=Hz, kHz or rad/s")
+    return factor
 
 
 def _is_scrambled(value: NDArray[Any]) -> bool:
@@ -646,4 +682,5 @@ UNIVERSAL_FILE = FileFormat(
     looks_alike=lambda path, _: path.suffix.lower() in (".uff", ".unv"),
     read=_read,
     write=write_uff,
+    takes=("responses", "excitations", "direction", "components", "frequency", "coordinates"),
 )

@@ -93,11 +93,25 @@ def node_coordinates(file: UniversalFile, nodes: Collection[int]) -> dict[int, N
                 names = name_some("node", [int(row[0]) for row in rows[local]])
                 file.note(f"coordinates of {names} are local and are left out", number)
             rows = rows[~local]
-        unit = file.unit_system(number)
-        if unit is None and rows.size:
-            file.note("the coordinates have no unit (there is no dataset 164): m is assumed", number)
-        coordinates |= {int(row[0]): row[3:] / (unit.length if unit else 1.0) for row in rows}
+        metre = _metre(file, number)
+        if metre is None and rows.size:
+            file.note(
+                "the coordinates have no unit (there is no dataset 164) and are left out; give unit= with "
+                "coordinates=m", number
+            )  # fmt: skip
+            continue
+        coordinates |= {int(row[0]): row[3:] * (metre or 1.0) for row in rows}
     return coordinates
+
+
+def _metre(file: UniversalFile, number: int) -> float | None:
+    """Return the unit of the coordinates of a dataset in m: the one that the user states, else by dataset 164."""
+    system = file.unit_system(number)
+    by_file = None if system is None else 1.0 / system.length
+    try:
+        return file.reading.agreed("coordinates", file.reading.units.coordinates_to_m, by_file, f"{by_file or 1.0:g} m")
+    except ValueError as error:
+        raise file.error(f"(dataset {number}): {error}") from error
 
 
 def node_axes(file: UniversalFile, nodes: Collection[int]) -> dict[int, FloatArray | None]:

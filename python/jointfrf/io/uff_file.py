@@ -12,6 +12,7 @@ from typing import BinaryIO, NamedTuple
 
 from jointfrf.errors import FileContentError
 from jointfrf.files import HEAD
+from jointfrf.io.file_format import Reading
 from jointfrf.io.uff_function import DamagedNumbersError
 from jointfrf.io.units import UnitSystem
 from jointfrf.spelling import some_of
@@ -184,8 +185,8 @@ class UniversalFile:
         It is no Universal File; every method raises it where the file is damaged.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, reading: Reading | None = None) -> None:
+        self.path, self.reading = path, reading or Reading()
         self._notes: dict[str, list[int]] = {}
         self._systems: dict[int, UnitSystem] | None = None
         self._index, is_cut = index_datasets(path)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from jointfrf.files import HEAD
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel
-from jointfrf.io.units import Exponents, Unit, UnitSystem, parse_unit
+from jointfrf.io.units import SAME_FACTOR, Exponents, Unit, UnitSystem, parse_unit
 
 __all__ = [
     "DELIMITER",
@@ -62,8 +62,6 @@ _DATA_TYPES = {
 _UNSAID = (0, 1)
 _FORCES = (9, 13)
 _QUANTITY = {8: "receptance", 11: "mobility", 12: "accelerance"}
-#: How far factors of labels and of dataset 164 may differ: programs write four digits or more.
-_TOLERANCE = 1e-3
 #: How far, relative to it, a line may lie from where an even spacing puts it: 13 columns hold as many digits.
 _EVEN = 1e-9
 
@@ -91,12 +89,33 @@ class Axis:
 
 
 @lru_cache(256)  # a file repeats few of them in thousands of functions
-def _axis(record: str) -> Axis:
+def _axis(record: bytes) -> Axis:
     """Take an axis from its record."""
-    words = _fields(record, _AXIS, range(4))
-    label = "" if words[5].upper() == "NONE" else words[5]
+    text = _text(record)
+    words = _fields(text, _AXIS, range(4))
     data_type, *_ = map(int, words[:4])  # and three exponents, which are not used
+    label = _unit_label(record) if words == _columns(text, _AXIS) else words[5]
+    label = "" if label.upper() == "NONE" else label
     return Axis(data_type, label, parse_unit(label))
+
+
+def _text(record: bytes) -> str:
+    """Return a record as text: UTF-8, else Latin-1, in which older programs write micro signs and powers."""
+    try:
+        return record.decode("utf-8").replace("\0", " ")
+    except UnicodeDecodeError:
+        return record.decode("latin-1").replace("\0", " ")
+
+
+def _unit_label(record: bytes) -> str:
+    """Return the unit label: programs fill the 20 columns of names and labels by characters or by bytes of UTF-8."""
+    found = []
+    for fields in (_text(record)[_AXIS[5]], _text(record[_AXIS[5]])):
+        label = fields.strip()
+        if fields[:1].strip() == "" and label not in found:  # a blank before it
+            found.append(label)
+    labels = [label for label in found if label]
+    return "' or '".join(labels)  # which is not understood if there are two
 
 
 class DamagedNumbersError(ValueError):
@@ -138,12 +157,12 @@ def read_header(content: bytes) -> FunctionHeader:
         The dataset is damaged.
     """
     lines = content[:HEAD].splitlines(keepends=True)[:_N_LINES]
-    records = [line.decode("utf-8", "replace").rstrip("\r\n") for line in lines]
+    records = [_text(line.rstrip(b"\r\n")) for line in lines]
     place, form = _fields(records[7], _PLACE, _PLACE_NUMBERS), _fields(records[8], _FORM, range(6))
     is_binary = records[1][6:7].lower() == "b"
     order, floating_point, n_lines, _ = map(int, _columns(records[1], _BINARY)[2:]) if is_binary else (1, 2, 11, 0)
     start, step, _ = map(_number, form[3:])
-    abscissa, numerator, denominator, _ = (_axis(record) for record in records[9:13])
+    abscissa, numerator, denominator, _ = (_axis(line.rstrip(b"\r\n")) for line in lines[9:13])
     return FunctionHeader(
         int(place[0]),
         (place[4], _whole(place[5]), _whole(place[6])),
@@ -321,8 +340,15 @@ def ordinate_factor(
     system: UnitSystem | None,
     uses_labels: bool,
     note: Callable[[str], None],
-) -> float:
-    """Factor that turns the ordinate into SI units: by the labels, else by dataset 164, else 1 with a note.
+) -> tuple[float | None, str]:
+    """Factor that turns the ordinate into SI units, by the labels or, without labels, by dataset 164.
+
+    Returns
+    -------
+    float or None
+        None if a unit is missing, not understood or not one of the quantity.
+    str
+        What is wrong then.
 
     Raises
     ------
@@ -331,23 +357,23 @@ def ordinate_factor(
     """
     motion, force, ratio = _exponents(*channels, POWER_OF_I_OMEGA[quantity])
     if numerator.unit is not None and numerator.unit.exponents == ratio:
-        return _checked(numerator, numerator.unit, system, note)
+        return _checked(numerator, numerator.unit, system, note), ""
     factors = []
     for axis, exponents, what in ((numerator, motion, "response"), (denominator, force, "excitation")):
         if axis.unit is not None and axis.unit.exponents == exponents:
             factors.append(_checked(axis, axis.unit, system, note))
-            continue
-        if axis.unit is not None and uses_labels:
-            raise ValueError(
-                f"the unit '{axis.label}' does not fit the {what} of {quantity} {channels[0]} / {channels[1]}"
-            )
-        why = f"the unit '{axis.label}' of the {what} is not used" if axis.label else f"the {what} has no unit"
-        if system is None:
-            note(f"{why} and there is no dataset 164: SI units are assumed")
+        elif axis.unit is not None:
+            why = f"the unit '{axis.label}' does not fit the {what} of {quantity} {channels[0]} / {channels[1]}"
+            if uses_labels:
+                raise ValueError(why)
+            return None, why
         elif axis.label:
-            note(f"{why}: dataset 164 gives the units")
-        factors.append(1.0 if system is None else system.to_si(exponents))
-    return factors[0] / factors[1]
+            return None, f"the unit '{axis.label}' of the {what} is not understood"
+        elif system is None:
+            return None, f"the {what} has no unit"
+        else:
+            factors.append(system.to_si(exponents))
+    return factors[0] / factors[1], ""
 
 
 def _exponents(response: Channel, excitation: Channel, power: int) -> tuple[Exponents, Exponents, Exponents]:
@@ -360,7 +386,7 @@ def _exponents(response: Channel, excitation: Channel, power: int) -> tuple[Expo
 def _checked(axis: Axis, unit: Unit, system: UnitSystem | None, note: Callable[[str], None]) -> float:
     """Factor of a label; a note where dataset 164 contradicts it (no system of 164 has g, so g is none)."""
     by_system = unit.to_si if system is None else system.to_si(unit.exponents)
-    if not math.isclose(unit.to_si, by_system, rel_tol=_TOLERANCE) and not axis.label.lower().startswith("g"):
+    if not math.isclose(unit.to_si, by_system, rel_tol=SAME_FACTOR) and not axis.label.lower().startswith("g"):
         note(f"the unit '{axis.label}' contradicts dataset 164: the unit is used")
     return unit.to_si
 

@@ -154,5 +154,5 @@ def test_a_mobility_labelled_accelerance_is_cured_once(points, on_points, tmp_pa
     (line,) = errors_of(result)
     assert "mobilities read as accelerance" in line
     assert "Read the file as mobilities" in line
-    cured = run_command("check", file, *words, "--quantity", "mobility", "--force-quantity")
+    cured = run_command("check", file, *words, "--unit", "m/s/N", "--force-quantity")
     assert (cured.returncode, errors_of(cured)) == (0, [])

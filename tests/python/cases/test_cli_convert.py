@@ -93,8 +93,22 @@ def test_a_quantity_against_the_file_must_be_forced(tmp_path, command):
     assert refused.returncode == 1
     assert "says that it holds accelerance (acceleration [m/s^2] per excitation force [N] in dataset" in refused.stderr
     forced = run_command(*words, "--force-quantity")
+    assert "the unit 'm/s^2' does not fit the response of mobility" in forced.stderr
+    assert "give --unit, such as g/N" in forced.stderr
+    forced = run_command(*words, "--force-quantity", "--unit", "m/s/N")
     assert "says that it holds" not in forced.stderr
-    assert "SI units are assumed" in forced.stderr or "is not used" in forced.stderr
+    assert "--unit" not in forced.stderr
+
+
+def test_a_unit_that_the_file_does_not_state(tmp_path):
+    given = frf_set()
+    write_mat(tmp_path / "a.mat", f=FREQ_HZ, H=given.h, responses=names(given.responses),
+              excitations=names(given.excitations))  # fmt: skip
+    refused = run(tmp_path / "a.mat", tmp_path / "a.npz", expect=1).stderr
+    assert refused.endswith("a.mat: the FRFs have no unit; give --unit, such as g/N or (m/s^2)/N\n")
+    said = run(tmp_path / "a.mat", tmp_path / "a.npz", "--unit", "mm/s^2/N").stdout
+    assert "in the file: FRFs of an unnamed quantity [no unit], unit stated: mm/s^2/N" in said
+    np.testing.assert_allclose(read_frfs(tmp_path / "a.npz").h, 1e-3 * given.h)
 
 
 def test_coherence_of_the_file_is_used_by_the_manifold(tmp_path):

@@ -16,6 +16,7 @@ MAP = {
     "h": "zz.A", "freq_hz": "zz.lines", "axes": "out,in,freq", "response_nodes": "zz.n",
     "response_directions": "zz.way", "excitation_nodes": "zz.n", "excitation_directions": "zz.codes",
 }  # fmt: skip
+UNITS = {"accelerance": "m/s^2/N", "receptance": "m/N"}
 WORDS = [word for pair in MAP.items() for word in ("--map", "=".join(pair))]
 BEAM = (
     'model = "beam"\nlength = {length}\nelements = 3\nelement = "euler-bernoulli"\naxial = false\n'
@@ -84,7 +85,7 @@ def test_every_command_reads_what_is_mapped(plain, mapped, quantity):
     other = {BARS: "bars.mat", "b.npz": "b.mat", "c.npz": "c.mat"}
     words = [other[word] if word in mapped else word for word in plain]
     found = []
-    for each in (plain, [*words, *WORDS, "--quantity", quantity]):
+    for each in (plain, [*words, *WORDS, "--unit", UNITS[quantity]]):
         numbers = sorted(_numbers(json.loads(said(*each, "--json").stdout)))
         target = next((word for word in each if str(word).startswith("x.")), None)
         found.append((numbers, None if target is None else read_frfs(target).h))
@@ -107,7 +108,7 @@ def _numbers(content):
 
 def test_files_of_cases_and_assemblies_map_as_well(tmp_path):
     table = ", ".join(f'{name} = "{value}"' for name, value in MAP.items())
-    part = f'model = "receptances"\nfile = "b.mat"\nquantity = "receptance"\nmap = {{ {table} }}\n'
+    part = f'model = "receptances"\nfile = "b.mat"\nunit = "m/N"\nmap = {{ {table} }}\n'
     text = (
         f'[A]\n{BEAM.format(length=0.3, first="clamped")}joint = ["4:y", "4:theta"]\n\n[B]\n{part}'
         'joint = ["1:y", "1:rz"]\n\n[joint]\ndofs = ["y", "theta_z"]\nstiffness = [5e5, 4e3]\n'
@@ -142,5 +143,5 @@ def test_a_wrong_map_is_one_sentence(change, message):
 
 
 def test_a_project_may_say_the_map():
-    Path("p.toml").write_text(f"quantity = 'accelerance'\nmap = {[f'{a}={b}' for a, b in MAP.items()]}\n")
+    Path("p.toml").write_text(f"unit = 'm/s^2/N'\nmap = {[f'{a}={b}' for a, b in MAP.items()]}\n")
     assert "36 receptances" in said("check", "bars.mat", "--config", "p.toml").stdout

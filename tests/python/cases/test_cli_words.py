@@ -53,7 +53,7 @@ def _elsewhere(tmp_path, monkeypatch):
         (["check", "a.uff", "--j", "5:3"], "'5:3' is no node number or range"),
         (["check", "a.uff", "--j", "1:9999999"], "are too many nodes; name at most 100000"),
         (["check", "a.uff", "--config", "no.toml"], "--config: file no.toml does not exist"),
-        (["check", "a.uff", "--force-quantity"], "--force-quantity without a quantity"),
+        (["check", "a.uff", "--force-quantity"], "--force-quantity has no effect without --quantity or --unit; leave it out"),
         (["completion", "bsh"], "did you mean bash?"),
         (["cases", "--key"], "did you mean --keys?"),
         ([], "identify a joint from measured FRFs"),
@@ -404,7 +404,17 @@ def test_paths_through_a_link_mean_what_the_system_means(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("fields", "words", "message"),
     [
-        ({"quantity": None}, [], "it is not said what the FRFs are: give --quantity (receptance, mobility or acceler"),
+        ({"quantity": None}, [], "the FRFs have no unit; give --unit, such as g/N or (m/s^2)/N"),
+        ({"unit": "V"}, [], "the unit 'V' is not understood; give --unit, such as g/N"),
+        ({"unit": "m/N"}, ["--unit", "mm/N"], "not the one of --unit; leave --unit out, or give --force-quantity"),
+        ({"unit": "m/N"}, ["--unit", "phase=rad"], "--unit phase= has no effect on a.npz; leave it out"),
+        ({"unit": "m/N"}, ["--skip-lines", "2"], "--skip-lines has no effect on a.npz; leave it out"),
+        (
+            {"unit": "m/N"},
+            ["--unit", "mm/N", "--quantity", "mobility"],
+            "--unit mm/N is one of receptance, not mobility",
+        ),
+        ({}, ["--unit", "V"], "argument --unit: unit 'V' of frf is not understood; use motion per force, such as g/N"),
         ({"unit": "m/N"}, ["--quantity", "mobility"], "leave --quantity out, or say --force-quantity"),
         ({"h": np.ones((2, 2, 2)), "freq_hz": [1.0, 2.0], "more": 1}, [], "give --map axes=, such as freq,out,in"),
         ({"y": 1}, [], "has several fields for h; give --map h=... out of h, y"),
@@ -422,7 +432,7 @@ def test_messages_speak_of_options(tmp_path, fields, words, message):
     result = run_command("convert", "a.npz", "b.npz", *words)
     assert result.returncode != 0
     assert message in result.stderr
-    assert not re.search(r"mapping|limit_gb|quantity=|force it", result.stderr)
+    assert not re.search(r"mapping|limit_gb|quantity=|unit=|skip_lines|force it", result.stderr)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no such signal")

@@ -123,7 +123,7 @@ def test_receptances_may_stand_in_any_format(by_receptances):
 
 @pytest.mark.filterwarnings("ignore::jointfrf.FileContentWarning")
 def test_a_quantity_may_be_said(by_receptances):
-    """The file says accelerance: another quantity must be forced."""
+    """The file states accelerance: another quantity must be forced, and its unit stated."""
     path = by_receptances / "case.toml"
     text, power = path.read_text(), {"accelerance": 2, "mobility": 1, "receptance": 0}
     h = {}
@@ -133,7 +133,7 @@ def test_a_quantity_may_be_said(by_receptances):
             path.write_text(text.replace('file = "a.uff"', said))
             with pytest.raises(jf.FileContentError, match="says that it holds accelerance"):
                 read_case(by_receptances)
-            said += "\nforce_quantity = true"
+            said += f'\nforce_quantity = true\nunit = "{"m/s/N" if quantity == "mobility" else "m/N"}"'
         path.write_text(text.replace('file = "a.uff"', said))
         h[quantity] = read_case(by_receptances).a.receptance(BEAMS.freq_hz, ["3:y", "3:rz"])
     i_omega = 2j * np.pi * BEAMS.freq_hz[:, None, None]

@@ -33,8 +33,11 @@ def names(channels):
     return [str(channel) for channel in channels]
 
 
-def structure_of_testlab(frfs, *, label="g/N", factor=1.0, type_="FRF", values=None, step=None):
-    """A structure as Simcenter Testlab exports one: a column for each function."""
+def structure_of_testlab(
+    frfs, *, label="g/N", factor=0.0, info="", type_="FRF", values=None, step=None
+):  # fmt: skip
+    """A structure as Simcenter Testlab exports one: a column for each function; factor 0: by the label, None: none."""
+    factor = (1 / 9.80665 if label.startswith("g") else 1.0) if factor == 0.0 else factor
     values = frfs.h if values is None else values
     pairs = [(i, j) for i in range(len(frfs.responses)) for j in range(len(frfs.excitations))]
     side = [
@@ -55,8 +58,13 @@ def structure_of_testlab(frfs, *, label="g/N", factor=1.0, type_="FRF", values=N
             "values": np.stack([values[:, i, j] for i, j in pairs], axis=1),
             "quantity": {
                 "label": label,
-                "unit_transformation": {"factor": factor, "offset": 0.0, "log_reference": 1.0},
-            },
+                "info": info,
+            }
+            | (
+                {}
+                if factor is None
+                else {"unit_transformation": {"factor": factor, "offset": 0.0, "log_reference": 1.0}}
+            ),
         },
         "function_record": {"type": type_, "primary_channel": side[0], "reference_channel": side[1]},
     }

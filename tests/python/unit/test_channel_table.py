@@ -102,6 +102,8 @@ def test_what_is_wrong_in_toml(tmp_path, old, new, message):
     [
         ("weight\n", "wait\n", "unknown column 'wait'.*did you mean weight"),
         ("x [mm]", "x [yd]", "only x, y, z have a unit"),
+        ("x [mm]", "x [N]", "only x, y, z have a unit"),
+        ("weight\n", "weight [mm]\n", "only x, y, z have a unit"),
         ("role;x", "node;x", "a column is named twice"),
         ("0,6", "a", "line 4: direction_y must be a number, not 'a'"),
         ("0,6;-0,8;2", "0,6;-0,8", "line 4 has 10 columns, the heading has 11"),

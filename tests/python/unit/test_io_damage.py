@@ -120,7 +120,8 @@ KNOWN = (
         (pickled(), "is a pickle, which could run any program; save an NPZ file"),
         (array_file(), "is an NPY file, one array without frequencies"),
         (b"\x1f\x8b\x08", "is compressed by gzip; unpack it"),
-        (b"TDSm\0\0", "is a TDMS file: export a Universal File"),
+        (b"TDSm\0\0", "is a TDMS file of LabVIEW, which is not read; export its FRFs as a Universal File or CSV"),
+        (b"LabVIEW Measurement\t\r\n", "is an LVM file of LabVIEW, which is not read; export its FRFs as"),
         (b"PK\x03\x04 and nothing", "cannot be read as an NPZ file"),
         (b"\x89HDF\r\n\x1a\n and nothing", "cannot be read as an HDF5 file"),
         (b"MATLAB 5.0 MAT-file and nothing", "cannot be read as a MATLAB file"),
@@ -264,7 +265,7 @@ def test_names_that_are_not_ascii(tmp_path):
         make(path)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FileContentWarning)
-            assert read_frfs(path, quantity="accelerance").responses == GIVEN.responses
+            assert read_frfs(path, unit="m/s^2/N").responses == GIVEN.responses
     path = folder / "kopf.uff"
     path.write_bytes(function().replace(b"NONE\n", "Prüfstand m/s²\n".encode("latin-1"), 2))
     np.testing.assert_allclose(read_frfs(path).h[:, 0, 0], VALUES)
@@ -286,7 +287,7 @@ def test_names_that_are_not_ascii(tmp_path):
             {"nodes": [1, 2], "coordinates": np.zeros((1, 3))},
             "have shape (1, 3), expected three for each of 2 nodes",
         ),
-        ({"quantity": "impedance"}, "quantity 'impedance' is none of"),
+        ({"quantity": "impedance"}, "unknown quantity 'impedance'; use one of"),
     ],
 )
 @pytest.mark.parametrize("name", ["a.npz", "a.h5"])

@@ -1,5 +1,6 @@
 """FRFs come back from every format: as written here, and as other programs write them."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -99,7 +100,6 @@ def test_arrays_of_scripts_in_matlab_files(tmp_path, write, axes, order):
     assert found.stated == "FRFs of an unnamed quantity [(m/s^2)/N]"
 
 
-@pytest.mark.filterwarnings("ignore::jointfrf.errors.FileContentWarning")
 @pytest.mark.parametrize("write", [write_mat, write_mat73])
 def test_a_mapping_says_which_field_is_what(tmp_path, write):
     given = frf_set("mobility")
@@ -110,17 +110,17 @@ def test_a_mapping_says_which_field_is_what(tmp_path, write):
         "excitations": "101:+x,201:+y",
         "axes": "freq,out,in",
     }
-    with pytest.warns(FileContentWarning, match="there is no unit: SI units are assumed"):
-        same(read_frfs(path, quantity="mobility", mapping=mapping), given, rtol=1e-12)
+    with pytest.raises(FileContentError, match="the FRFs have no unit; give unit="):
+        read_frfs(path, quantity="mobility", mapping=mapping)
+    same(read_frfs(path, mapping=mapping, unit="m/s/N"), given, rtol=1e-12)
     with pytest.raises(FileContentError, match=r"no field for the FRFs; give mapping h=... out of .*test\.A"):
         read_frfs(path)
     with pytest.raises(FileContentError, match=r"no field 'test\.C'; use one of .*test\.B"):
         read_frfs(path, mapping={"h": "test.C"})
     with pytest.raises(ValueError, match=r"unknown field 'axis' in mapping; use one of .*; did you mean axes"):
         read_frfs(path, mapping={"axis": "freq,out,in"})
-    assert read_frfs(path, quantity="mobility", mapping=FrfMapping(**(mapping | {"h": "test.B"}))).h[0, 0, 0] == (
-        2 * given.h[0, 0, 0]
-    )
+    found = read_frfs(path, unit="m/s/N", mapping=FrfMapping(**(mapping | {"h": "test.B"})))
+    assert found.h[0, 0, 0] == 2 * given.h[0, 0, 0]
 
 
 @pytest.mark.parametrize(
@@ -137,8 +137,8 @@ def test_a_mapping_says_which_field_is_what(tmp_path, write):
         ),
         ({"responses": ["101:x", "101:x", "103:z"]}, r"names 101:\+x twice in its responses"),
         ({"responses": np.array([[101, 1], [102, -2], [103, 9]])}, "node 103 with direction code 9"),
-        ({"unit": "furlong"}, "it is not said what the FRFs are: give quantity="),
-        ({"quantity": "impedance"}, "quantity 'impedance' is none of"),
+        ({"unit": "furlong"}, "the unit 'furlong' is not understood; give unit="),
+        ({"quantity": "impedance"}, "unknown quantity 'impedance'; use one of"),
         ({"quantity": "mobility"}, r"the unit 'm/s\^2/N' does not fit mobility"),
         ({"coherence": np.full((5, 3, 2), 2.0)}, "coherence must be from 0 to 1"),
         ({"averages": 0.5}, "averages must be 1 or more"),
@@ -188,19 +188,46 @@ def test_structures_of_testlab(tmp_path, write):
     )
     with pytest.warns(FileContentWarning, match=r"not read, no FRF: functions \(1 of type Signal\)"):
         found = read_frfs(path)
-    same(found, frf_set(h=GRAVITY * given.h))
+    same(found, given)
     np.testing.assert_array_equal(found.coherence, coherence)
-    assert found.stated == "FRFs of an unnamed quantity [g/N]"
+    assert found.stated == "FRFs of an unnamed quantity [m N^-1 s^-2]"
 
 
-def test_the_factor_of_testlab_must_not_contradict_its_unit(tmp_path):
+@pytest.mark.parametrize(
+    ("label", "factor", "info"),
+    [
+        ("g/N", 1 / GRAVITY, "Data saved by Testlab in MKS"),
+        ("g/N", 1 / GRAVITY, ""),
+        ("g/N", None, "Data saved by Testlab in MKS"),
+        ("m/s^2/N", 1.0, ""),
+        ("(m/s²)/N", None, ""),
+        ("mm/s^2/N", 1e3, "Data saved by Testlab in MKS"),
+    ],
+)
+def test_values_of_testlab_are_in_si(tmp_path, label, factor, info):
+    """The factor goes from SI to the label, as in files that Testlab saves in MKS."""
     given = frf_set()
-    path = write_mat(tmp_path / "a.mat", FRF=structure_of_testlab(given, factor=GRAVITY))
-    same(read_frfs(path), frf_set(h=GRAVITY * given.h))
-    path = write_mat(tmp_path / "a.mat", FRF=structure_of_testlab(given, factor=1 / GRAVITY))
-    with pytest.raises(FileContentError, match=r"unit 'g/N' with the factor 0.101972: whether .* say unit= by mapping"):
+    path = write_mat(tmp_path / "a.mat", FRF=structure_of_testlab(given, label=label, factor=factor, info=info))
+    same(read_frfs(path), given)
+
+
+@pytest.mark.parametrize(
+    ("label", "factor", "message"),
+    [
+        ("g/N", GRAVITY, "the unit 'g/N, factor 9.80665' is not understood; give unit="),
+        ("g/N", 1.0, "the unit 'g/N, factor 1' is not understood"),
+        ("g/N", None, "the unit 'g/N, no factor' is not understood"),
+        ("V/N", 1.0, "the unit 'V/N' is not understood"),
+    ],
+)
+def test_the_unit_of_testlab_must_be_clear_or_stated(tmp_path, label, factor, message):
+    given = frf_set()
+    path = write_mat(tmp_path / "a.mat", FRF=structure_of_testlab(given, label=label, factor=factor))
+    with pytest.raises(FileContentError, match=re.escape(message)):
         read_frfs(path)
-    same(read_frfs(path, mapping={"unit": "m/s^2/N"}), given)
+    same(read_frfs(path, unit="mm/s^2/N"), frf_set(h=1e-3 * given.h))
+    with pytest.raises(ValueError, match=r"mapping unit= has no effect on .*a\.mat; leave it out"):
+        read_frfs(path, unit="mm/s^2/N", mapping={"unit": "mm/s^2/N"})
 
 
 @pytest.mark.parametrize(
@@ -426,10 +453,10 @@ def test_one_frf_that_is_not_finite_leaves_the_others(tmp_path):
 def test_functions_of_sdynpy(tmp_path):
     given = frf_set()
     path = write_sdynpy(tmp_path / "a.npz", given)
-    with pytest.warns(FileContentWarning, match="there is no unit: SI units are assumed"):
-        same(read_frfs(path, quantity="accelerance"), given)
-    with pytest.raises(FileContentError, match="it is not said what the FRFs are: give quantity="):
-        read_frfs(path)
+    same(read_frfs(path, unit="m/s^2/N"), given)
+    for quantity in (None, "accelerance"):
+        with pytest.raises(FileContentError, match="the FRFs have no unit; give unit="):
+            read_frfs(path, quantity=quantity)
     with pytest.raises(FileContentError, match=r"functions of type 6 of sdynpy; save FRFs \(type 4\)"):
         read_frfs(write_sdynpy(tmp_path / "a.npz", given, function_type=6))
 
@@ -460,11 +487,12 @@ def test_units_are_shown_as_the_file_has_them_and_as_used(tmp_path):
     assert shown[2] == "used as: 1 accelerances (m/s^2)/N: 1 responses x 1 excitations, none missing"
     with pytest.raises(FileContentError, match=r"the file says that it holds accelerance \(g/N\), not mobility"):
         read_frfs(path, quantity="mobility")
-    with pytest.warns(FileContentWarning, match="unit 'g/N' is not used: SI units are assumed"):
-        assert read_frfs(path, quantity="mobility", force_quantity=True).h[0, 0, 0] == 1.5
+    with pytest.raises(FileContentError, match="the unit 'g/N' does not fit mobility; give unit="):
+        read_frfs(path, quantity="mobility", force_quantity=True)
+    assert read_frfs(path, unit="mm/s/N", force_quantity=True).h[0, 0, 0] == 1.5e-3
 
 
-PLAIN = "freq,1:x / 1:x mag [m/N],1:x / 1:x phase,1:x / 1:x coherence\n1,2,90,0.5\n2,3,-180,1\n"
+PLAIN = "freq [Hz],1:x / 1:x mag [m/N],1:x / 1:x phase [deg],1:x / 1:x coherence\n1,2,90,0.5\n2,3,-180,1\n"
 
 
 @pytest.mark.parametrize(
@@ -475,8 +503,8 @@ PLAIN = "freq,1:x / 1:x mag [m/N],1:x / 1:x phase,1:x / 1:x coherence\n1,2,90,0.
         b"\xef\xbb\xbf" + PLAIN.encode(),
         PLAIN.encode("utf-16"),
         PLAIN.replace("\n", "\r\n").encode() + b"\x1a",
-        PLAIN.replace("phase", "phase [rad]").replace("90", repr(np.pi / 2)).replace("-180", repr(-np.pi)).encode(),
-        PLAIN.replace("phase", "phase [°]").encode("latin-1"),
+        PLAIN.replace("[deg]", "[rad]").replace("90", repr(np.pi / 2)).replace("-180", repr(-np.pi)).encode(),
+        PLAIN.replace("[deg]", "[°]").encode("latin-1"),
         ("# Prüfstand: Halle 3\n# averages: 4\n" + PLAIN).encode(),
         PLAIN.replace("1:x / 1:x", '"Balken:1:+X/Balken:1:+X"').encode(),
     ],
@@ -495,14 +523,22 @@ def test_forms_of_text_tables(tmp_path, content):
     [
         ("1,2,90,0.5", "1,2,90", "line 2 has 3 columns, the heading has 4"),
         ("1,2,90,0.5", "1,2,ninety,0.5", "line 2, column 3: 'ninety' is not a number"),
-        ("freq", "time", "first column must be the frequency, not 'time'"),
-        ("freq", "freq [rpm]", "unit 'rpm' of the frequency is none of"),
-        ("1:x / 1:x mag", "channel 1 mag", "does not name response / excitation and real"),
-        ("1:x / 1:x phase", "1:x / 1:x mag", "has two columns '1:x / 1:x mag'"),
-        ("1:x / 1:x phase", "1:x / 1:x imag", r"holds? .*takes real and imag, or magnitude and phase|has .* it takes"),
-        ("mag [m/N]", "mag [dB]", r"magnitude of 1:\+x / 1:\+x must be linear"),
-        ("1,2,90,0.5\n2,3,-180,1\n", "", "no table of numbers below a heading"),
-        ("freq", "# averages: many\nfreq", "averages 'many' is not a number"),
+        ("freq [Hz]", "time [s]", "has times in its first column .'time .s.'., no frequencies; estimate FRFs"),
+        ("freq [Hz]", "freq [m]", "unit 'm' of the frequencies is not understood; give unit= with frequency=Hz"),
+        ("freq [Hz]", "freq", "no unit in the heading 'freq'; write 'frequency .Hz.' or give unit="),
+        ("1:x / 1:x mag", "channel 1 mag", "unknown column 'channel 1 mag .m/N.'; name response / excitation"),
+        ("1:x / 1:x phase [deg]", "1:x / 1:x mag [m/N]", r"has two columns magnitude of 1:\+x / 1:\+x"),
+        (
+            "1:x / 1:x phase [deg]",
+            "1:x / 1:x imag",
+            r"holds? .*takes real and imag, or magnitude and phase|has .* it takes",
+        ),
+        ("mag [m/N]", "mag [dB]", r"unit 'dB' of the magnitude of 1:\+x / 1:\+x has no reference; give unit='dB re"),
+        ("mag [m/N]", "mag", "the FRFs have no unit; give unit="),
+        ("mag [m/N]", "mag [V/N]", "the unit 'V/N' is not understood; give unit="),
+        ("phase [deg]", "phase", r"there is no unit of the phase of 1:\+x / 1:\+x; give unit= with phase=deg"),
+        ("1,2,90,0.5\n2,3,-180,1\n", "", "no table of numbers below its heading"),
+        ("freq [Hz]", "# averages: many\nfreq [Hz]", "averages 'many' is not a number"),
         (",0.5", ",-0.5", "coherence must be from 0 to 1"),
         ("2,3,-180,1", "2,nan,-180,1", "left out: NaN or Inf on 1 of 2 lines, first at 2 Hz"),
     ],

@@ -1,7 +1,5 @@
 """Sets of FRFs put together, their coherence and averages, and what contradicts each other."""
 
-import warnings
-
 import numpy as np
 import pytest
 
@@ -175,9 +173,9 @@ def test_what_the_user_says_must_not_contradict_the_file(write):
     message = r"says that it holds accelerance \(acceleration \[m/s\^2\] per excitation force \[N\] in dataset 1\), not"
     with pytest.raises(FileContentError, match=message):
         read_uff(path, quantity="mobility")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FileContentWarning)
-        forced = read_uff(path, quantity="mobility", force_quantity=True)
+    with pytest.raises(FileContentError, match=r"does not fit the response of mobility .*; give unit="):
+        read_uff(path, quantity="mobility", force_quantity=True)
+    forced = read_uff(path, unit="m/s/N", force_quantity=True)
     assert (forced.quantity, forced.h[0, 0, 0]) == ("mobility", VALUES[0])
     assert read_uff(path, quantity="accelerance").h[0, 0, 0] == VALUES[0]
 

@@ -13,7 +13,6 @@ import pytest
 
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.io import read_frfs, read_uff
-from jointfrf.io.units import parse_unit
 from uff_writer import FREQ_HZ, VALUES, dataset, function, nodes_15, nodes_2411, system_2420, units
 
 DATA = Path(os.environ.get("JOINTFRF_TEST_DATA", Path(__file__).resolve().parents[4] / "shared" / "data"))
@@ -93,16 +92,53 @@ def test_each_frf_has_the_units_that_stand_before_it(write):
     np.testing.assert_allclose(frfs.h[:, 1, 0] / frfs.h[:, 0, 0], 1e3)
 
 
-def test_units_that_are_assumed_are_said(write):
-    path = write(function(numerator=(12, "NONE")), function(numerator=(12, "NONE"), response=(2, 2)))
-    with pytest.warns(FileContentWarning, match=r"response has no unit .*SI units are assumed \(datasets 1, 2\)"):
-        assert read_uff(path).h[0, 0, 0] == VALUES[0]
-    with pytest.warns(FileContentWarning, match="unit 'V' of the response is not used .*SI units are assumed"):
-        read_uff(write(function(numerator=(12, "V"))))
-    with pytest.warns(FileContentWarning, match="unit 'V' of the response is not used: dataset 164 gives"):
-        assert read_uff(write(units(1e3, 1.0), function(numerator=(12, "V")))).h[0, 0, 0] == 1e-3 * VALUES[0]
+@pytest.mark.parametrize(
+    ("numerator", "denominator", "message"),
+    [
+        ((12, "NONE"), (13, "N"), r"the response has no unit \(dataset 1\); give unit="),
+        ((12, "m/s^2"), (13, "NONE"), r"the excitation has no unit \(dataset 1\); give unit="),
+        ((12, "V"), (13, "N"), r"the unit 'V' of the response is not understood \(dataset 1\); give unit="),
+        ((12, "m/s^2"), (13, "mV"), r"the unit 'mV' of the excitation is not understood \(dataset 1\); give unit="),
+    ],
+)
+def test_a_unit_that_is_missing_or_not_understood_must_be_stated(write, numerator, denominator, message):
+    path = write(function(numerator=numerator, denominator=denominator))
+    with pytest.raises(FileContentError, match=message):
+        read_uff(path)
+    found = read_uff(path, unit="g/N")
+    np.testing.assert_allclose(found.h[:, 0, 0], 9.80665 * VALUES, rtol=1e-12)
+    assert found.stated.endswith("unit stated: g/N")
+
+
+def test_dataset_164_stands_for_missing_labels_only(write):
+    with pytest.raises(FileContentError, match="unit 'V' of the response is not understood"):
+        read_uff(write(units(1e3, 1.0), function(numerator=(12, "V"))))
     with pytest.warns(FileContentWarning, match="'m/s\\^2' contradicts dataset 164: the unit is used"):
         assert read_uff(write(units(1e3, 1.0), function())).h[0, 0, 0] == VALUES[0]
+
+
+def test_a_stated_unit_must_not_contradict_the_file_unless_forced(write):
+    path = write(function(numerator=(12, "m/s^2")))
+    with pytest.raises(FileContentError, match=r"unit of the FRFs is 'm/s\^2' / 'N', not the one of unit=; leave unit"):
+        read_uff(path, unit="g/N")
+    with pytest.raises(FileContentError, match=r"says that it holds accelerance .*, not receptance"):
+        read_uff(path, unit="mm/N")
+    with pytest.raises(ValueError, match="unit mm/N is one of receptance, not mobility"):
+        read_uff(path, quantity="mobility", unit="mm/N")
+    np.testing.assert_allclose(read_uff(path, unit="g/N", force_quantity=True).h[:, 0, 0], 9.80665 * VALUES)
+    assert read_uff(path, unit="(m/s²)/N").h[0, 0, 0] == VALUES[0]
+    for unit in ("phase=rad", "dB re 1 m/s^2/N"):
+        with pytest.raises(ValueError, match=r"has no effect on .*; leave it out"):
+            read_uff(path, unit=unit)
+
+
+def test_a_stated_unit_is_none_of_rotations(write):
+    turned = {"response": (1, 6), "numerator": (12, "NONE")}
+    with pytest.raises(FileContentError, match=r"has a rotation in dataset 1 .*give SI units"):
+        read_uff(write(function(**turned)), unit="g/N")
+    assert read_uff(write(function(**turned)), unit="m/s^2/N").h[0, 0, 0] == VALUES[0]
+    known = write(function(numerator=(12, "NONE")), function(response=(1, 6), numerator=(12, "rad/s^2")))
+    np.testing.assert_allclose(read_uff(known, unit="g/N").h[0, :, 0], [9.80665 * VALUES[0], VALUES[0]])
 
 
 def test_a_label_of_another_quantity_is_refused_unless_the_caller_names_it(write):
@@ -112,16 +148,18 @@ def test_a_label_of_another_quantity_is_refused_unless_the_caller_names_it(write
     ):
         read_uff(path)
     assert read_uff(path, quantity="receptance").h[0, 0, 0] == pytest.approx(1e-3 * VALUES[0])
-    with pytest.warns(FileContentWarning, match="SI units are assumed"):
-        assert read_uff(path, quantity="accelerance").h[0, 0, 0] == VALUES[0]
+    with pytest.raises(FileContentError, match=r"'mm' does not fit the response of accelerance .*; give unit="):
+        read_uff(path, quantity="accelerance")
+    assert read_uff(path, unit="m/s^2/N").h[0, 0, 0] == VALUES[0]
 
 
 def test_an_unknown_data_type_needs_the_word_of_the_caller(write):
     path = write(function(numerator=(0, "NONE"), denominator=(0, "NONE")))
     with pytest.raises(FileContentError, match=r"data types 0 \(unknown.*give quantity= \(dataset 1\)"):
         read_uff(path)
-    with pytest.warns(FileContentWarning, match="SI units are assumed"):
-        assert read_uff(path, quantity="mobility").quantity == "mobility"
+    with pytest.raises(FileContentError, match="the response has no unit"):
+        read_uff(path, quantity="mobility")
+    assert read_uff(path, unit="m/s/N").quantity == "mobility"
     with pytest.raises(ValueError, match="unknown quantity 'inertance'; use one of"):
         read_uff(path, quantity="inertance")
 
@@ -136,8 +174,17 @@ def test_mixed_quantities_become_the_one_differentiated_most(write):
 def test_frequencies_in_rad_per_second_are_converted(write):
     frfs = read_uff(write(function(abscissa=(18, "rad/s"))))
     np.testing.assert_allclose(frfs.freq_hz, FREQ_HZ / (2 * np.pi))
-    with pytest.warns(FileContentWarning, match="unit 'furlong' of the frequencies is not known: Hz is assumed"):
-        read_uff(write(function(abscissa=(18, "furlong"))))
+    np.testing.assert_allclose(read_uff(write(function(abscissa=(18, "RPM")))).freq_hz, FREQ_HZ / 60)
+    np.testing.assert_array_equal(read_uff(write(function(abscissa=(18, "NONE")))).freq_hz, FREQ_HZ)
+    for label, message in (("furlong", "unit 'furlong' of the frequencies is not"), ("1/s", "unit '1/s' of the freq")):
+        path = write(function(abscissa=(18, label)))
+        with pytest.raises(FileContentError, match=f"{message}.*; give unit= with frequency=Hz"):
+            read_uff(path)
+        np.testing.assert_allclose(read_uff(path, unit="frequency=kHz").freq_hz, 1e3 * FREQ_HZ)
+    with pytest.raises(FileContentError, match="the frequencies have no unit"):
+        read_uff(write(function(abscissa=(0, "NONE"))))
+    with pytest.raises(FileContentError, match="unit of the frequencies is 'Hz', not the one of unit="):
+        read_uff(write(function()), unit="frequency=rad/s")
     with pytest.raises(FileContentError, match="over rpm, not frequency"):
         read_uff(write(function(abscissa=(19, "rpm"))))
 
@@ -153,8 +200,12 @@ def test_coordinates_are_in_metres(write, nodes):
 
 def test_coordinates_that_cannot_be_trusted_are_said(write):
     turned = [[0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, 0, 0]]
-    with pytest.warns(FileContentWarning, match="m is assumed"):
-        assert read_uff(write(nodes_2411({1: (1, 2, 3)}), function())).coordinates[1].tolist() == [1, 2, 3]
+    with pytest.warns(FileContentWarning, match="have no unit .*are left out; give unit= with coordinates=m"):
+        assert not read_uff(write(nodes_2411({1: (1, 2, 3)}), function())).coordinates
+    found = read_uff(write(nodes_2411({1: (1, 2, 3)}), function()), unit="coordinates=mm").coordinates[1]
+    np.testing.assert_allclose(found, [1e-3, 2e-3, 3e-3])
+    with pytest.raises(FileContentError, match=r"unit of the coordinates is '0\.001 m', not the one of unit="):
+        read_uff(write(units(1e3, 1), nodes_2411({1: (1, 2, 3)}), function()), unit="coordinates=m")
     local = nodes_15({1: (1, 2, 3)}, definition=5)
     with pytest.warns(FileContentWarning, match="coordinates of node 1 are local and are left out"):
         assert not read_uff(write(units(1, 1), system_2420(5, turned), local, function())).coordinates
@@ -183,7 +234,10 @@ def test_coordinates_that_cannot_be_trusted_are_said(write):
         ({"reference": (1, 0)}, r"names no reference direction \(code 0\); give mapping direction=z \(dataset 1\)"),
         ({"numerator": (15, "Pa")}, r"pressure per excitation force, not motion per force \(dataset 1\)"),
         ({"values": VALUES.real, "number_type": 4}, "real numbers, without phase"),
-        ({"function_type": 1}, r"holds 1 time history \(dataset 58, function type 1\) and no FRF"),
+        (
+            {"function_type": 1},
+            r"holds 1 time history \(dataset 58, function type 1\) and no FRF; estimate FRFs .*pyFRF",
+        ),
         ({"function_type": 99}, "holds 1 function of another kind"),
     ],
 )
@@ -459,34 +513,6 @@ def test_a_damaged_file_is_read_or_refused_but_nothing_else(write):
             warnings.simplefilter("ignore", FileContentWarning)
             with suppress(FileContentError):
                 read_uff(write(bytes(content)))
-
-
-@pytest.mark.parametrize(
-    ("label", "to_si", "exponents"),
-    [
-        ("m/s/s", 1.0, (1, 0, -2)),
-        ("M/SEC**2", 1.0, (1, 0, -2)),
-        ("m s-2", 1.0, (1, 0, -2)),
-        ("m·s^-2", 1.0, (1, 0, -2)),
-        ("m/(N s2)", 1.0, (1, -1, -2)),
-        ("1/kg", 1.0, (1, -1, -2)),
-        ("µm", 1e-6, (1, 0, 0)),
-        ("lb-in", 4.4482216152605 * 0.0254, (1, 1, 0)),
-        ("N.m", 1.0, (1, 1, 0)),
-        ("deg/s", np.pi / 180, (0, 0, -1)),
-        ("MN", 1e6, (0, 1, 0)),
-        ("LBF", 4.4482216152605, (0, 1, 0)),
-    ],
-)
-def test_unit_labels(label, to_si, exponents):
-    unit = parse_unit(label)
-    assert unit.to_si == pytest.approx(to_si, rel=1e-12)
-    assert unit.exponents == exponents
-
-
-@pytest.mark.parametrize("label", ["", "NONE", "V", "m/", "m/s^", "(m", "m)", "^2", "m/0", "m=s", "NM", "/N", "()"])
-def test_labels_that_are_not_understood(label):
-    assert parse_unit(label) is None
 
 
 needs_lap_joint = pytest.mark.skipif(not LAP_JOINT.exists(), reason=f"no {LAP_JOINT} (set JOINTFRF_TEST_DATA)")

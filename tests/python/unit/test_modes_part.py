@@ -120,7 +120,9 @@ def test_complex_modes_of_a_universal_file(tmp_path, kind):
     poles, shapes, modal_a = complex_modes(model)
     both = zip([*poles, *poles.conj()], [*shapes.T, *shapes.T.conj()], [*modal_a, *modal_a.conj()], strict=True)
     (tmp_path / "modes.uff").write_text("".join(complex_dataset(*mode, kind) for mode in both))
-    found = part_of(tmp_path, "uff").receptance(FREQ, ["1:y", "5:y"])
+    with pytest.raises(FileContentError, match=r"modes without units \(there is no dataset 164\); give units=SI"):
+        part_of(tmp_path, "uff")
+    found = part_of(tmp_path, "uff", 'units = "SI"\n').receptance(FREQ, ["1:y", "5:y"])
     expected = model.receptance(FREQ, model.ports("1:y", "5:y"))
     np.testing.assert_allclose(found, expected, rtol=2e-3, atol=1e-4 * abs(expected).max())
 
@@ -214,12 +216,12 @@ def test_a_normal_mode_of_dataset_2414(tmp_path):
     for node, y in zip(NODES, shapes[::2, 3], strict=True):
         lines += [f"{node:10d}", "".join(f"{x:13.5E}" for x in (0.0, y, 0.0))]
     (tmp_path / "modes.uff").write_text("\n".join([*lines, "    -1", ""]))
-    (tmp_path / "part.toml").write_text('model = "modes"\nfile = "modes.uff"\njoint = ["1:y"]\n')
+    (tmp_path / "part.toml").write_text('model = "modes"\nfile = "modes.uff"\njoint = ["1:y"]\nunits = "mm-t-s"\n')
     h = jf.read_part(tmp_path / "part.toml").receptance(FREQ, ["1:y", "5:y"])
     omega, own = 2 * np.pi * FREQ[:, None, None], 2 * np.pi * freq[3]
     phi = shapes[[0, 8], 3]
     expected = np.outer(phi, phi) / (own**2 - omega**2 + 2j * 0.02 * own * omega)
-    np.testing.assert_allclose(h, expected, rtol=1e-4)
+    np.testing.assert_allclose(h, 1e-3 * expected, rtol=1e-4)  # shapes in mm, the modal mass in t mm^2
 
 
 SHAPES = {"frequency": [10.0, 20.0], "damping": 0.01, "phi": np.ones((2, 2)), "modal_mass": 1.0, "dofs": ["1:y", "2:y"]}

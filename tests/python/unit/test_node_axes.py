@@ -157,7 +157,9 @@ def test_modes_of_arrays_take_the_directions_of_their_nodes(tmp_path, name):
     (tmp_path / name).write_text(_FILES[name])
     arrays = {"nat_freq": [40.0], "nat_xi": [0.02], "Phi": np.ones((2, 1)), "modal_mass": [1.0], "dofs": ["1:z", "2:z"]}
     np.savez(tmp_path / "m.npz", **arrays)
-    (tmp_path / "part.toml").write_text(f'model = "modes"\nfile = "m.npz"\nnodes = "{name}"\njoint = ["2:z"]\n')
+    (tmp_path / "part.toml").write_text(
+        f'model = "modes"\nfile = "m.npz"\nnodes = "{name}"\nunits = "SI"\njoint = ["2:z"]\n'
+    )
     part = jf.read_part(tmp_path / "part.toml")
     assert part.has("1:local_z")
     assert not part.has("1:z")

@@ -15,8 +15,10 @@ from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit, check_file, damage_named, head_of, text_of
 from jointfrf.io.fe.bulk import bulk_cards, bulk_number, is_bulk
 from jointfrf.io.fe.matrix_format import dof_name
+from jointfrf.io.file_format import Reading
 from jointfrf.io.uff_axes import node_axes, node_coordinates
 from jointfrf.io.uff_file import UniversalFile
+from jointfrf.io.units import StatedUnits
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["NodeFile", "read_dof_names", "read_nodes"]
@@ -251,12 +253,13 @@ def _of_ansys(path: Path, limit: ReadLimit) -> NodeFile:
 
 
 def _of_universal(path: Path, limit: ReadLimit) -> NodeFile:
-    file = UniversalFile(path)
+    has_units = bool(UniversalFile(path).datasets(164))
+    file = UniversalFile(path, Reading(units=StatedUnits(coordinates="" if has_units else "m")))
     numbers = {int(row.split()[0]) for number in file.datasets(15, 2411) for row in file.records(number) if row.split()
                and row.split()[0].isdecimal()}  # fmt: skip
     places = node_coordinates(file, numbers)
     turned = tuple(str(node) for node in sorted(node_axes(file, numbers)))
-    return NodeFile({str(node): place for node, place in places.items()}, turned=turned, is_si=True)
+    return NodeFile({str(node): place for node, place in places.items()}, turned=turned, is_si=has_units)
 
 
 def _of_table(path: Path, limit: ReadLimit) -> NodeFile:
