@@ -187,7 +187,18 @@ class StudyStore:
         return StudyRecord(checked.name, checked.title, checked.seed, checked.realisations, held["identity"], groups)
 
     def begin(self, record: StudyRecord) -> None:
-        """Write what the study is."""
+        """Write what the study is.
+
+        Raises
+        ------
+        FileContentError
+            There are chunks without a `study.json`: nothing states of which study they are.
+        """
+        # In this order: another process that begins the same study writes study.json before its first chunk.
+        if self.spans(record) and not self.exists:
+            raise FileContentError(
+                f"{self._chunks.path} contains chunks of an unknown study, without study.json: name another folder"
+            )
         self._chunks.make()
         groups = [
             {"point": dict(one.point), "noise": one.noise, "columns": [_plain(column) for column in one.columns]}

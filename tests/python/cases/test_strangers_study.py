@@ -291,6 +291,20 @@ def test_a_record_that_would_fill_the_memory_is_rejected(study, home):
     rejected(study, r"study\.json states content of .* GB or more", home)
 
 
+def test_chunks_of_an_unknown_study_are_not_taken(study):
+    """Without study.json the chunks of a stranger were results of any study into this folder."""
+    part = shutil.copytree(study, study.parent / "part")
+    (study / "study.json").unlink()
+    for call in (lambda: go_on(study), lambda: jf.merge_studies([part], study)):
+        with pytest.raises(
+            jf.FileContentError, match=r"chunks contains chunks of an unknown study, without study\.json"
+        ):
+            call()
+    assert not (study / "study.json").exists()
+    shutil.rmtree(study / "chunks")
+    assert go_on(study).missing == 0
+
+
 def test_a_record_with_other_columns_is_of_another_version(study, home):
     record = json.loads((study / "study.json").read_text())
     record["groups"][0]["columns"].pop()
