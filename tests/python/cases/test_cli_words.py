@@ -53,7 +53,7 @@ def _elsewhere(tmp_path, monkeypatch):
         (["check", "a.uff", "--j", "5:3"], "'5:3' is no node number or range"),
         (["check", "a.uff", "--j", "1:9999999"], "are too many nodes; name at most 100000"),
         (["check", "a.uff", "--config", "no.toml"], "--config: file no.toml does not exist"),
-        (["check", "a.uff", "--force-quantity"], "--force-quantity has no effect without --quantity or --unit; leave it out"),
+        (["check", "a.uff", "--force-quantity"], "without --quantity or --unit; leave it out"),
         (["completion", "bsh"], "did you mean bash?"),
         (["cases", "--key"], "did you mean --keys?"),
         ([], "identify a joint from measured FRFs"),
