@@ -113,7 +113,10 @@ def add_arguments(parser: CommandParser) -> None:
         "fit FRFs that are bent by amplitude all the same, with a warning: they describe one test, not the structure",
     )
     parser.option(
-        "--window-decay SIGMA", "exponential window exp(-SIGMA t) of the test, 1/s: taken off stiffnesses", float
+        "--window-decay SIGMA",
+        "decay of the exponential window exp(-SIGMA t) of the test, 1/s: accelerances are divided by s^2, mobilities "
+        "by s = i w + SIGMA, and SIGMA c is subtracted from stiffnesses",
+        float,
     )
     parser.option(
         "--bending-stiffness EI",
@@ -146,7 +149,7 @@ def run(args: argparse.Namespace) -> int:
     out = Output(args)
     _check_points(args)
     measured = read_measured(args)
-    frfs = measured.receptance()
+    frfs = measured.receptance(args.window_decay or 0.0)
     joint = measured_joint(args, frfs, args.bending_stiffness)
     laws = joint_of_laws(args, joint.dofs)
     sides = _sides(args, frfs, joint)
@@ -186,6 +189,8 @@ def _check_results(args: argparse.Namespace) -> None:
             raise UsageError(f"--report: {args.report} is a folder, not a file")
     elif args.space:
         raise UsageError("--space is of --report: name a file for the page")
+    if args.window_decay and args.method != ["compliance"]:
+        raise UsageError("--window-decay corrects method compliance only; leave out the other method")
     check_folder("--save", args.save)
 
 
@@ -214,7 +219,7 @@ def _warn(args: argparse.Namespace, joint: MeasuredJoint, check: FrfCheck) -> No
     if "compliance" not in args.method:
         warn_of_ignored(
             args,
-            ("--damping", "--cross", "--noise", "--setup-gain", "--common-gain", "--window-decay"),
+            ("--damping", "--cross", "--noise", "--setup-gain", "--common-gain"),
             f"method {args.method[0]} does not use it",
         )
     if joint.channels is not None or len(joint.nodes[0]) == 1:

@@ -33,6 +33,7 @@ from jointfrf.io.uff_function import (
     place_fields,
     read_header,
 )
+from jointfrf.io.uff_window import note_exponential_windows
 from jointfrf.kernel.arguments import check_type
 from jointfrf.spelling import some_of
 
@@ -177,6 +178,7 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfSet:
         h = np.full((freq_hz.size, *matrix.shape), np.nan + 0j)
     freq_hz, h, coherence = _without_bad_zero_line(file, frfs, matrix, freq_hz, h, coherence)
     coordinates = node_coordinates(file, {channel.node for pair in pairs for channel in pair})
+    note_exponential_windows(file)
     reading.notes.extend(file.notes())
     stated = _some(frf.stated for frf in frfs)
     return FrfSet(
