@@ -6,6 +6,7 @@ import argparse
 
 from jointfrf.channels.check.check import check_frfs
 from jointfrf.channels.check.finding import FrfCheck
+from jointfrf.cli.masses import add_mass_arguments, check_masses, check_stated, scale_of_joint
 from jointfrf.cli.measured_file import add_file_arguments, file_names, in_some_band, read_measured
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
 from jointfrf.cli.parser import CommandParser
@@ -27,6 +28,7 @@ def add_arguments(parser: CommandParser) -> None:
         "reference point beside the channels, else all channels. Exit status 0: neither errors nor warnings; 1: some."
     )
     add_file_arguments(parser)
+    add_mass_arguments(parser)
 
 
 def check_joint(joint: MeasuredJoint, read_as: str) -> FrfCheck:
@@ -50,7 +52,10 @@ def run(args: argparse.Namespace) -> int:
         joint = measured_joint(args, frfs, is_look=True)
         check = check_joint(joint, measured.quantity)
         warned = [*joint.warnings(check)]
-        out.say(*joint.text(), *(f"warning: {text}" for text in warned))
+        check_stated(args)
+        scale = scale_of_joint(joint)
+        check_masses(args, scale)
+        out.say(*joint.text(), *scale.text(), *(f"warning: {text}" for text in warned))
         out.warn(*warned)
     else:
         lines = in_some_band(frfs.freq_hz, frfs.h, args.band)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import warnings
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, get_args
 
@@ -19,6 +20,7 @@ from jointfrf.cli.check import check_joint
 from jointfrf.cli.export import CardRequest, add_card_arguments, card_request, page_nodes, parse_export, written_cards
 from jointfrf.cli.identify_model import add_model_arguments, run_model
 from jointfrf.cli.joint_laws import add_law_arguments, joint_of_laws
+from jointfrf.cli.masses import add_mass_arguments, check_masses, check_stated, scale_of_fit
 from jointfrf.cli.measured_file import (
     add_file_arguments,
     file_names,
@@ -98,6 +100,7 @@ def add_arguments(parser: CommandParser) -> None:
     )
     parser.option("--side-k PART", "the same of side k", Path)
     add_law_arguments(parser)
+    add_mass_arguments(parser)
     parser.option("--noise LEVEL", "relative noise of the FRFs, 0.01 for 1 %% (default: from their reciprocity)", float)
     parser.option(
         "--setup-gain LEVEL",
@@ -148,6 +151,8 @@ def run(args: argparse.Namespace) -> int:
     _refuse(args, ("each", "find_wrong_channels"), "is for tests with --model: name the file of the assembly")
     out = Output(args)
     _check_points(args)
+    _check_window(args)
+    check_stated(args)
     measured = read_measured(args)
     frfs = measured.receptance(args.window_decay or 0.0)
     joint = measured_joint(args, frfs, args.bending_stiffness)
@@ -165,7 +170,9 @@ def run(args: argparse.Namespace) -> int:
     for method in args.method:
         with waiting(f"fit by {method}"):
             fits.append(_fit(args, method, frfs, joint, laws, tuple(side.model for side in sides)))
-        out.say("", fits[-1])
+        scale = scale_of_fit(fits[-1])
+        check_masses(args, scale, sides)
+        out.say("", fits[-1], *scale.text())
         out.warn(*fits[-1].warnings)
     text, written = _write_results(args, frfs, joint, fits, request)
     if text and args.output is None:
@@ -189,8 +196,6 @@ def _check_results(args: argparse.Namespace) -> None:
             raise UsageError(f"--report: {args.report} is a folder, not a file")
     elif args.space:
         raise UsageError("--space is of --report: name a file for the page")
-    if args.window_decay and args.method != ["compliance"]:
-        raise UsageError("--window-decay corrects method compliance only; leave out the other method")
     check_folder("--save", args.save)
 
 
@@ -207,8 +212,24 @@ def _check_points(args: argparse.Namespace) -> None:
         warn_of_ignored(args, ("--save-lines",), "it is for --save")
     if args.points is None:
         _refuse(args, ("same",), "is of several joint points: name them by --points")
+        if args.cross == "points":
+            raise UsageError("--cross points is of several joint points; name them by --points")
     else:
+        unknown = [name for own in args.same or () for name in own if name not in args.points]
+        if unknown:
+            raise UsageError(f"unknown joint point {unknown[0]} in --same; use names of --points")
         _refuse(args, ("side_j", "side_k"), "corrects the FRFs of one joint point: it does not go with --points")
+
+
+def _check_window(args: argparse.Namespace) -> None:
+    """Raise an error for options that do not go with an exponential window."""
+    if args.window_decay is not None and not args.window_decay >= 0:
+        raise UsageError(f"--window-decay must not be negative, not {args.window_decay:g}")
+    if args.window_decay:
+        why = "does not go with --window-decay, which corrects springs and dampers by method compliance; leave one out"
+        _refuse(args, ("law", "joint", "side_j", "side_k"), why)
+        if args.method != ["compliance"]:
+            raise UsageError(f"--method {','.join(args.method)} {why}")
 
 
 def _warn(args: argparse.Namespace, joint: MeasuredJoint, check: FrfCheck) -> None:
@@ -261,6 +282,7 @@ def _content(
         "checks": check.to_dict(),
         "warnings": [*joint.warnings(check), *check.serious, *(text for fit in fits for text in fit.warnings)],
         "fits": [fit_to_dict(fit, lines=False) for fit in fits],
+        "scales": [asdict(scale_of_fit(fit)) for fit in fits],
         "cards": text or None,
         "written": [str(path) for path in written],
     }

@@ -36,7 +36,7 @@ _OF_THE_JOINT = (
     ("--j", "j"), ("--k", "k"), ("--dofs", "dofs"), ("--at", "at"), ("--at-k", "at_k"), ("--channels", "channels"),
     ("--spacing", "spacing"), ("--axis", "axis"), ("--law", "law"), ("--joint", "joint"),
     ("--bending-stiffness", "bending_stiffness"), ("--side-j", "side_j"), ("--side-k", "side_k"),
-    ("--window-decay", "window_decay"),
+    ("--window-decay", "window_decay"), ("--mass-j", "mass_j"), ("--mass-k", "mass_k"), ("--mass", "mass"),
 )  # fmt: skip
 #: Characters of a line of the table of several tests.
 _WIDTH = 100
