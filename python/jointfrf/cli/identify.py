@@ -165,6 +165,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.accept_bent:
         refuse_bent(check.findings)
     _warn(args, joint, check)
+    _warn_of_far_points(frfs, joint)
     out.say(*_heading(args, frfs, joint), *(line for side in sides for line in side.text))
     fits = []
     for method in args.method:
@@ -245,6 +246,28 @@ def _warn(args: argparse.Namespace, joint: MeasuredJoint, check: FrfCheck) -> No
         )
     if joint.channels is not None or len(joint.nodes[0]) == 1:
         warn_of_ignored(args, ("--bending-stiffness",), "no rotation is found by differences along a line")
+
+
+def _warn_of_far_points(frfs: FrfSet, joint: MeasuredJoint) -> None:
+    """Warn of points along lines if the nearest two of each side have reference points less than half as far apart."""
+    places = [[frfs.coordinates.get(node) for node in own] for own in joint.nodes]
+    if joint.channels is not None or joint.is_of_points or any(at is None for own in places for at in own):
+        return
+    lines = [np.array(own) for own in places]
+    apart = float(np.linalg.norm(np.subtract(*joint.responses.references)))
+    if min(map(len, lines)) <= 2:
+        return
+    # The two points of each side that are nearest to the other side.
+    near = [np.sort(np.argsort(np.linalg.norm(own[:, None] - other, axis=2).min(axis=1), kind="stable")[:2])
+            for own, other in (lines, lines[::-1])]  # fmt: skip
+    nearer = float(np.linalg.norm(lines[0][near[0]].mean(axis=0) - lines[1][near[1]].mean(axis=0)))
+    if nearer < apart / 2:
+        j, k = (",".join(str(nodes[i]) for i in at) for nodes, at in zip(joint.nodes, near, strict=True))
+        text = (
+            f"reference points {1e3 * apart:.3g} mm apart make the parts between them belong to the joint; use "
+            f"--j {j} --k {k} ({1e3 * nearer:.3g} mm)"
+        )
+        warnings.warn(text, FrfCheckWarning, stacklevel=3)
 
 
 def _write_results(

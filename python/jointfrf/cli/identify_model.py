@@ -23,7 +23,7 @@ from jointfrf.cli.usage import Output, UsageError, complain, time_left, waiting
 from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
 from jointfrf.files import write_file
 from jointfrf.identification.record import fit_to_dict, write_record
-from jointfrf.identification.result import Fit, columns_of
+from jointfrf.identification.result import UNDETERMINED, Fit, columns_of, is_undetermined
 from jointfrf.io.units import model_units
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.report.fit_model import next_sentences
@@ -285,6 +285,8 @@ def _table(fits: dict[str, Fit]) -> Iterator[str]:
 
 
 def _cell(value: float, low: float, high: float) -> str:
+    if is_undetermined(low, high):
+        return UNDETERMINED
     if not np.isfinite(high):
         return f"above {low:.3g}"
     half = (high - low) / 2

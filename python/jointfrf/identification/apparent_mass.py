@@ -205,8 +205,8 @@ def _masses(
             return
         (inverse[p, q], slope, *_), errors, last = found
         spread[p, q], highest = errors[0] ** 2, min(highest, last)
-        is_translation = not is_rotation(dofs[p])
-        if p == q and is_translation and not _is_known(inverse[p, p], errors[0], slope * omega[0] ** 2):
+        known = _is_known(float(inverse[p, q]), float(errors[0]), float(slope * omega[0] ** 2))
+        if p == q and not (known or is_rotation(dofs[p])):
             return
     up_to = float(omega[highest] / (2 * np.pi))
     mass = np.linalg.pinv((inverse + inverse.T) / 2)

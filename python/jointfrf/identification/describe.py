@@ -20,7 +20,7 @@ from jointfrf.identification.joint_alone import with_joint_alone
 from jointfrf.identification.manifold.coordinates import CrossTerms
 from jointfrf.identification.manifold.estimate import JointEstimate
 from jointfrf.identification.manifold.fit import DofDamping, ManifoldFit
-from jointfrf.identification.manifold.prepare import FitProblem
+from jointfrf.identification.manifold.prepare import FitProblem, shown_percent
 from jointfrf.identification.manifold.transforms import Transforms
 from jointfrf.identification.model.fit import FoundModel, OpenDirection
 from jointfrf.identification.model.joint_motion import FoundMotion
@@ -375,8 +375,10 @@ def _unknown_cross(result: JointEstimate, dofs: tuple[str, ...], cross: CrossTer
             )
             found.append(warn("cross terms", text, about))
         if beside.scatter is not None:
-            share = beside.scatter / np.maximum(group.x[: len(group.dofs)], np.finfo(float).tiny)
-            varying = [f"{dofs[d]} by {100 * s:.0f} %" for d, s in zip(group.dofs, share, strict=True) if s > _VARIES]
+            share = beside.scatter / np.maximum(group.x[: len(group.dofs)], 0.05 * beside.scatter)
+            varying = [
+                f"{dofs[d]} by {shown_percent(s)}" for d, s in zip(group.dofs, share, strict=True) if s > _VARIES
+            ]
             text = (
                 f"the compliance varies from line to line beyond its noise: {', '.join(varying)}; "
                 "its mean was fitted, weighted by what the lines show"

@@ -116,6 +116,8 @@ def unstated_window(fit: Fit) -> list[Finding]:
     if not dampers or not isinstance(fit.data, FitData):
         return []
     compliance, information = fit.data.line_compliance(), fit.data.information()
+    if information.shape[1] != len(names):  # points that share their parameters
+        return []
     for d, dof in dampers:
         share = information[:, names.index(parameter_name("h", dof, dof))]
         k = fit.value.get(parameter_name("k", dof, dof), 0.0)

@@ -165,7 +165,7 @@ def identify(
     """
     if joint is not None:
         if damping is not None or cross is not None:
-            raise ValueError("joint says which laws are fitted: leave damping and cross out")
+            raise ValueError("damping and cross do not go with joint, which states the laws; leave them out")
         joint = _check_law_joint(joint, dofs)
         dofs = joint.dofs
         damping = "viscous"
@@ -195,7 +195,7 @@ def identify(
     else:
         count = 2 * np.count_nonzero(np.isfinite(problem.frfs.variance))
         if count < len(joint.names):
-            raise ValueError(f"{count} numbers measured cannot give {len(joint.names)} parameters of laws")
+            raise ValueError(f"{count} measured numbers for {len(joint.names)} parameters of laws; use more lines")
         found = fit_laws(problem, joint)
         fit = describe_laws(found, joint)
     fit = replace(fit, data=compliance_data(found, problem, transform))
@@ -257,9 +257,9 @@ def _check_law_joint(joint: LawJoint, dofs: Sequence[str] | None) -> LawJoint:
         raise ValueError(f"dofs must name those of joint, {', '.join(joint.dofs)}, not {', '.join(names)}")
     if joint.mass:
         raise ValueError(
-            f"joint has a mass in {', '.join(joint.mass)}: FRFs at the joint cannot part it from the structures that "
-            "it moves with; leave it out, or give models of these to identify_model"
+            f"joint has a mass in {', '.join(joint.mass)}, which FRFs at the joint do not separate from the sides; "
+            "leave it out, or use identify_model"
         )
     if not joint.laws:
-        raise ValueError("joint has no law to fit: all DOFs are rigid")
+        raise ValueError("joint has no law to fit, all DOFs are rigid; give a law to at least one DOF")
     return LawJoint(joint.laws, joint.rigid, None, names)

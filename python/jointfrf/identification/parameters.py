@@ -280,7 +280,7 @@ def joint_vector(joint: LawJoint, fixed: Sequence[str], joint_stiffness: FloatAr
     names = joint.names
     for name in fixed:
         if name not in names:
-            raise ValueError(f"fixed names {name!r}, which is no parameter of the joint: {', '.join(names)}")
+            raise ValueError(f"unknown parameter {name!r} in fixed; use one of {', '.join(names)}")
     size = dict(zip(joint.dofs, joint_stiffness.tolist(), strict=True))
     return ParameterVector(
         tuple(_of_joint(one, i, one.name not in fixed, size) for i, one in enumerate(joint.quantities))
