@@ -51,3 +51,11 @@ def test_points_far_from_the_joint_are_named():
     assert "reference points 255 mm apart" in result.stderr
     assert "use --j 101,102 --k 201,202" in result.stderr
     assert "reference points" not in run_command("identify", BARS, "--j", "101,102", "--k", "201,202", *words).stderr
+
+
+def test_a_narrow_band_about_a_resonance_warns_of_nothing():
+    """|h| goes with a power of w in the hundreds within 1 % of a resonance."""
+    freq = np.linspace(231.0, 235.7, 41)
+    h = 1e-6 * (freq / 233.0)[:, None, None] ** -400.0 * np.array([[1.0, 0.5], [0.5, 1.0]]) * (1 - 0.5j)
+    with np.errstate(all="raise"):
+        jf.check_frfs(freq, jf.pollute(h, 0.01, seed=1), ["1:+y", "2:+y"])
