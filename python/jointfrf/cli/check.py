@@ -6,6 +6,7 @@ import argparse
 
 from jointfrf.channels.check.check import check_frfs
 from jointfrf.channels.check.result import FrfCheck
+from jointfrf.cli.masses import add_mass_arguments, check_masses, check_stated, scale_of_joint
 from jointfrf.cli.measured_file import add_file_arguments, file_names, in_some_band, read_measured
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
 from jointfrf.cli.parser import CommandParser
@@ -31,6 +32,7 @@ def add_arguments(parser: CommandParser) -> None:
         "jointfrf check cases/bending-sides/test.uff --at 0,0,0 --j 101:104 --k 201:204 --dofs y,rz",
     ]
     add_file_arguments(parser)
+    add_mass_arguments(parser)
 
 
 def check_joint(joint: MeasuredJoint, read_as: str) -> FrfCheck:
@@ -55,7 +57,10 @@ def run(args: argparse.Namespace) -> int:
         joint = measured_joint(args, frfs, is_look=True)
         check = check_joint(joint, measured.quantity)
         warned = [*joint.warnings(check)]
-        out.say(*joint.text(), *(f"warning: {text}" for text in warned))
+        check_stated(args)
+        scale = scale_of_joint(joint)
+        check_masses(args, scale)
+        out.say(*joint.text(), *scale.text(), *(f"warning: {text}" for text in warned))
         out.warn(*warned)
     else:
         lines = in_some_band(frfs.freq_hz, frfs.h, args.band)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import warnings
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, get_args
 
@@ -19,6 +20,7 @@ from jointfrf.cli.check import check_joint
 from jointfrf.cli.export import CardRequest, add_card_arguments, card_request, page_nodes, parse_export, written_cards
 from jointfrf.cli.identify_model import add_model_arguments, run_model
 from jointfrf.cli.joint_laws import add_law_arguments, joint_of_laws
+from jointfrf.cli.masses import add_mass_arguments, check_masses, check_stated, scale_of_fit
 from jointfrf.cli.measured_file import (
     add_file_arguments,
     file_names,
@@ -104,6 +106,7 @@ def add_arguments(parser: CommandParser) -> None:
     )
     parser.option("--side-k PART", "part.toml, model of side k alone; needs --side-j", Path)
     add_law_arguments(parser)
+    add_mass_arguments(parser)
     parser.option(
         "--noise LEVEL",
         "relative noise of the FRFs; 0.01 means 1 %%",
@@ -125,7 +128,12 @@ def add_arguments(parser: CommandParser) -> None:
         "--accept-bent",
         "fit amplitude-dependent FRFs, with a warning: the result describes this test, not the structure",
     )
-    parser.option("--window-decay SIGMA", "decay rate of the exponential window exp(-SIGMA t) of the test, 1/s", float)
+    parser.option(
+        "--window-decay SIGMA",
+        "decay rate of the exponential window exp(-SIGMA t) of the test, 1/s: accelerances are divided by s^2, "
+        "mobilities by s = i w + SIGMA, and SIGMA c is subtracted from stiffnesses",
+        float,
+    )
     parser.option(
         "--bending-stiffness EI",
         "E I of the thinner part in N m^2: prints the compliance that differences along a line add",
@@ -156,9 +164,11 @@ def run(args: argparse.Namespace) -> int:
     _refuse(args, ("each", "find_wrong_channels"), "needs --model; name the assembly.toml")
     out = Output(args)
     _check_points(args)
+    _check_window(args)
+    check_stated(args)
     with waiting(f"reading {file_names(args)}"):
         measured = read_measured(args)
-        frfs = measured.receptance()
+        frfs = measured.receptance(args.window_decay or 0.0)
     joint = measured_joint(args, frfs, args.bending_stiffness)
     laws = joint_of_laws(args, joint.dofs)
     sides = _sides(args, frfs, joint)
@@ -170,13 +180,16 @@ def run(args: argparse.Namespace) -> int:
     if not args.accept_bent:
         refuse_amplitude(check.findings)
     _warn(args, joint, check)
+    _warn_of_far_points(frfs, joint)
     out.say(*_heading(args, frfs, joint), *(line for side in sides for line in side.text))
     fits, interrupt = list[Fit](), Interrupt()
     with interrupt.kept_back(fits):
         for method in args.method:
             with waiting(f"fit by {method}"):
                 fits.append(_fit(args, method, frfs, joint, laws, tuple(side.model for side in sides)))
-            out.say("", fits[-1])
+            scale = scale_of_fit(fits[-1])
+            check_masses(args, scale, sides)
+            out.say("", fits[-1], *scale.text())
             out.warn(*fits[-1].warnings)
     with waiting("results"):
         text, written = _write_results(args, frfs, joint, fits, request)
@@ -218,8 +231,24 @@ def _check_points(args: argparse.Namespace) -> None:
         warn_of_ignored(args, ("--save-lines",), "nothing is saved without --save")
     if args.points is None:
         _refuse(args, ("same",), "needs several joint points; name them by --points")
+        if args.cross == "points":
+            raise UsageError("--cross points needs several joint points; name them by --points")
     else:
+        unknown = [name for own in args.same or () for name in own if name not in args.points]
+        if unknown:
+            raise UsageError(f"unknown joint point {unknown[0]} in --same; use names of --points")
         _refuse(args, ("side_j", "side_k"), "is for one joint point; leave out --points")
+
+
+def _check_window(args: argparse.Namespace) -> None:
+    """Raise an error for options that do not go with an exponential window."""
+    if args.window_decay is not None and not args.window_decay >= 0:
+        raise UsageError(f"--window-decay must not be negative, not {args.window_decay:g}")
+    if args.window_decay:
+        why = "does not go with --window-decay, which corrects springs and dampers by method compliance; leave one out"
+        _refuse(args, ("law", "joint", "side_j", "side_k"), why)
+        if args.method != ["compliance"]:
+            raise UsageError(f"--method {','.join(args.method)} {why}")
 
 
 def _warn(args: argparse.Namespace, joint: MeasuredJoint, check: FrfCheck) -> None:
@@ -235,6 +264,28 @@ def _warn(args: argparse.Namespace, joint: MeasuredJoint, check: FrfCheck) -> No
         )
     if joint.channels is not None or len(joint.nodes[0]) == 1:
         warn_of_ignored(args, ("--bending-stiffness",), "no rotation is found by differences along a line")
+
+
+def _warn_of_far_points(frfs: FrfSet, joint: MeasuredJoint) -> None:
+    """Warn of points along lines if the nearest two of each side have reference points less than half as far apart."""
+    places = [[frfs.coordinates.get(node) for node in own] for own in joint.nodes]
+    if joint.channels is not None or joint.is_of_points or any(at is None for own in places for at in own):
+        return
+    lines = [np.array(own) for own in places]
+    apart = float(np.linalg.norm(np.subtract(*joint.responses.references)))
+    if min(map(len, lines)) <= 2:
+        return
+    # The two points of each side that are nearest to the other side.
+    near = [np.sort(np.argsort(np.linalg.norm(own[:, None] - other, axis=2).min(axis=1), kind="stable")[:2])
+            for own, other in (lines, lines[::-1])]  # fmt: skip
+    nearer = float(np.linalg.norm(lines[0][near[0]].mean(axis=0) - lines[1][near[1]].mean(axis=0)))
+    if nearer < apart / 2:
+        j, k = (",".join(str(nodes[i]) for i in at) for nodes, at in zip(joint.nodes, near, strict=True))
+        text = (
+            f"reference points {1e3 * apart:.3g} mm apart make the parts between them belong to the joint; use "
+            f"--j {j} --k {k} ({1e3 * nearer:.3g} mm)"
+        )
+        warnings.warn(text, FrfCheckWarning, stacklevel=3)
 
 
 def _write_results(
@@ -273,6 +324,7 @@ def _content(
         "checks": check.to_dict(),
         "warnings": [*joint.warnings(check), *check.warnings, *(text for fit in fits for text in fit.warnings)],
         "fits": [fit_to_dict(fit, lines=False) for fit in fits],
+        "scales": [asdict(scale_of_fit(fit)) for fit in fits],
         "cards": text or None,
         "written": [str(path) for path in written],
     }

@@ -22,7 +22,7 @@ from jointfrf.cli.usage import Failures, Interrupt, Output, UsageError, listed, 
 from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
 from jointfrf.files import write_file
 from jointfrf.identification.record import fit_to_dict, write_record
-from jointfrf.identification.result import Fit, columns_of
+from jointfrf.identification.result import UNDETERMINED, Fit, columns_of, is_undetermined
 from jointfrf.io import FrfSet
 from jointfrf.io.units import model_units
 from jointfrf.kernel.arguments import FloatArray
@@ -38,7 +38,7 @@ _OF_THE_JOINT = (
     ("--j", "j"), ("--k", "k"), ("--dofs", "dofs"), ("--at", "at"), ("--at-k", "at_k"), ("--channels", "channels"),
     ("--spacing", "spacing"), ("--axis", "axis"), ("--law", "law"), ("--joint", "joint"),
     ("--bending-stiffness", "bending_stiffness"), ("--side-j", "side_j"), ("--side-k", "side_k"),
-    ("--window-decay", "window_decay"),
+    ("--window-decay", "window_decay"), ("--mass-j", "mass_j"), ("--mass-k", "mass_k"), ("--mass", "mass"),
 )  # fmt: skip
 #: Characters of a line of the table of several tests.
 _WIDTH = 100
@@ -308,6 +308,8 @@ def _table(fits: dict[str, Fit]) -> Iterator[str]:
 
 
 def _cell(value: float, low: float, high: float) -> str:
+    if is_undetermined(low, high):
+        return UNDETERMINED
     if not np.isfinite(high):
         return f"above {low:.3g}"
     half = (high - low) / 2

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.frf.setups import SetUps
-from jointfrf.kernel.arguments import as_array, as_integer, as_nodes, as_real, check_type
+from jointfrf.kernel.arguments import as_array, as_integer, as_nodes, as_not_negative, as_real, check_type
 from jointfrf.spelling import some_of
 
 __all__ = [
@@ -228,8 +228,14 @@ class FrfSet:
             name = f"{self.responses[i]} / {self.excitations[j]}"
             raise ValueError(f"FRF {name} holds NaN or Inf, first at {self.freq_hz[line]:g} Hz")
 
-    def receptance(self) -> FrfSet:
+    def receptance(self, window_decay: float = 0.0) -> FrfSet:
         """Return the same set as displacement per force.
+
+        Parameters
+        ----------
+        window_decay : float
+            Decay sigma of an exponential window exp(-sigma t) on the responses, 1/s, default 0. `identify` takes the
+            same number.
 
         Returns
         -------
@@ -243,7 +249,8 @@ class FrfSet:
 
         Notes
         -----
-        Mobility is divided by i w and accelerance by (i w)^2, which 0 Hz does not allow.
+        Mobility is divided by s and accelerance by s^2, s = i w + sigma: under an exponential window the FRF of a
+        linear structure is the one at s. Without a window 0 Hz does not allow the division.
 
         Examples
         --------
@@ -253,16 +260,16 @@ class FrfSet:
         >>> frfs.receptance().h.real
         array([[[3.]]])
         """
-        power = POWER_OF_I_OMEGA[self.quantity]
+        power, decay = POWER_OF_I_OMEGA[self.quantity], as_not_negative("window_decay", window_decay)
         if power == 0:
             return self
-        usable = self.freq_hz != 0.0
+        usable = (self.freq_hz != 0.0) | (decay > 0)
         if not usable.all():
             message = f"{self._name()}the line at 0 Hz is dropped: {self.quantity} gives no receptance there"
             warnings.warn(message, FileContentWarning, stacklevel=2)
         freq_hz = self.freq_hz[usable]
-        i_omega = 2j * np.pi * freq_hz
-        kept, over = self._lines(usable), i_omega[:, None, None] ** power
+        s = 2j * np.pi * freq_hz + decay
+        kept, over = self._lines(usable), s[:, None, None] ** power
         setups = None if kept.setups is None else kept.setups.times(1 / over[:, 0])
         return replace(kept, h=kept.h / over, quantity="receptance", setups=setups)
 

@@ -120,7 +120,7 @@ def _parsed(text: str, names: Sequence[str]) -> DerivedFunction:
     def named(match: re.Match[str]) -> str:
         name = match[1].strip()
         if name not in names:
-            raise ValueError(f"{text!r}: there is no parameter {name!r}, only {', '.join(names)}")
+            raise ValueError(f"unknown parameter {name!r} in {text!r}; use one of {', '.join(names)}")
         places[f"p{len(places)}_"] = name
         return f" p{len(places) - 1}_ "
 
@@ -132,7 +132,7 @@ def _parsed(text: str, names: Sequence[str]) -> DerivedFunction:
     known = {name: name for name in names} | places
     for node in ast.walk(tree):
         if isinstance(node, ast.Name) and node.id not in {*known, *_FUNCTIONS, "pi"}:
-            raise ValueError(f"{text!r}: there is no parameter {node.id!r}, only {', '.join(names)}")
+            raise ValueError(f"unknown parameter {node.id!r} in {text!r}; use one of {', '.join(names)}")
     with contextlib.suppress(ZeroDivisionError, OverflowError):
         _evaluated(tree, dict.fromkeys(known, math.nan), text)
     return lambda values: _evaluated(tree, {word: values[name] for word, name in known.items()}, text)

@@ -18,7 +18,7 @@ from jointfrf.identification.joint_alone import with_joint_alone
 from jointfrf.identification.manifold.coordinates import CrossTerms
 from jointfrf.identification.manifold.estimate import JointEstimate
 from jointfrf.identification.manifold.fit import DofDamping, ManifoldFit
-from jointfrf.identification.manifold.prepare import FitProblem
+from jointfrf.identification.manifold.prepare import FitProblem, shown_percent
 from jointfrf.identification.manifold.transforms import Transforms
 from jointfrf.identification.model.fit import FoundModel, OpenDirection
 from jointfrf.identification.model.joint_motion import FoundMotion
@@ -332,8 +332,10 @@ def _unknown_cross(result: JointEstimate, dofs: tuple[str, ...], cross: CrossTer
         if not beside.is_symmetric:
             found.append(Finding("compliance-unsymmetric", about=about))
         if beside.scatter is not None:
-            share = beside.scatter / np.maximum(group.x[: len(group.dofs)], np.finfo(float).tiny)
-            varying = [f"{dofs[d]} by {100 * s:.0f} %" for d, s in zip(group.dofs, share, strict=True) if s > _VARIES]
+            share = beside.scatter / np.maximum(group.x[: len(group.dofs)], 0.05 * beside.scatter)
+            varying = [
+                f"{dofs[d]} by {shown_percent(s)}" for d, s in zip(group.dofs, share, strict=True) if s > _VARIES
+            ]
             found += [Finding("compliance-scatter", {"varying": tuple(varying)}, about)] if varying else []
     return found
 

@@ -138,8 +138,8 @@ def _check_finite(fit: Fit) -> None:
     for name, value in fit.value.items():
         if not np.isfinite(value):
             raise ValueError(
-                f"{name} cannot be distinguished from a rigid connection and has no value: connect this DOF rigidly, "
-                "and fit the others without it"
+                f"{name} cannot be distinguished from a rigid connection; connect this DOF rigidly, and fit the others "
+                "without it"
             )
 
 
@@ -152,8 +152,8 @@ def _check_known(fit: Fit, intervals: dict[str, tuple[float, float]]) -> None:
     ]
     if names:
         raise ValueError(
-            f"only a lower bound is known of {', '.join(names)}: a rigid connection fits the data as well; connect "
-            "these DOFs rigidly, or ask for cards with their best estimates (bounds)"
+            f"only a lower bound is known of {', '.join(names)}; connect these DOFs rigidly, or use their best "
+            "estimates (bounds)"
         )
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from jointfrf.channels.check.amplitude import amplitude_of_channels, refuse_amplitude
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
@@ -16,6 +16,7 @@ from jointfrf.frf.bands import spread_lines
 from jointfrf.frf.setups import SetUps
 from jointfrf.identification.compliance_data import as_pair, channel_names, compliance_data
 from jointfrf.identification.describe import describe_laws, describe_springs
+from jointfrf.identification.exponential_window import unstated_window, without_window
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
 from jointfrf.identification.manifold.fit import fit_laws, fit_springs
 from jointfrf.identification.manifold.prepare import (
@@ -27,7 +28,6 @@ from jointfrf.identification.manifold.prepare import (
 from jointfrf.identification.manifold.transforms import Transform
 from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_measured
-from jointfrf.identification.profile import Intervals
 from jointfrf.identification.result import Fit
 from jointfrf.identification.side_models import SideModel
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, as_not_negative, check_type
@@ -103,8 +103,9 @@ def identify(
     reciprocal : bool
         Whether the structure is reciprocal, so that gamma_pq and gamma_qp may be averaged.
     window_decay : float
-        Decay sigma of an exponential window exp(-sigma t) on the responses, 1/s. FRFs are then those at i w + sigma,
-        and stiffnesses of springs grow by sigma c, which is taken off.
+        Decay sigma of an exponential window exp(-sigma t) on the responses, 1/s, default 0. The receptances must be
+        those at s = i w + sigma: divide an accelerance by s^2 and a mobility by s (`FrfSet.receptance`). Stiffnesses of
+        springs are larger there by sigma c, which is subtracted.
     sides : pair of SideModel, optional
         Models of both sides j and k, free of each other, that bend between channels and joint: the FRFs are corrected
         by them first, and what is not known of the models is in weights and intervals.
@@ -164,14 +165,16 @@ def identify(
     """
     if joint is not None:
         if damping is not None or cross is not None:
-            raise ValueError("joint says which laws are fitted: leave damping and cross out")
+            raise ValueError("damping and cross do not go with joint, which states the laws; leave them out")
         joint = _check_law_joint(joint, dofs)
         dofs = joint.dofs
         damping = "viscous"
     equal = as_equal_points(same)
     decay = as_not_negative("window_decay", window_decay)
     if decay and joint is not None:
-        raise ValueError("window_decay is taken off springs and dampers, not of laws: leave it out")
+        raise ValueError(f"window_decay {decay:g} corrects springs and dampers, not laws; leave out joint")
+    if decay and sides is not None:
+        raise ValueError(f"window_decay {decay:g}: models of sides give FRFs without a window; leave out sides")
     options = FitOptions(damping or "auto", cross or "zero", reciprocal, equal)
     measured = as_measured(freq_hz, gamma, square=False)
     problem = prepare_compliance(
@@ -188,15 +191,16 @@ def identify(
         found = fit_springs(problem)
         fit = describe_springs(found, problem)
         if decay:
-            fit = _without_window(fit, decay)
+            fit = without_window(fit, decay)
     else:
         count = 2 * np.count_nonzero(np.isfinite(problem.frfs.variance))
         if count < len(joint.names):
-            raise ValueError(f"{count} numbers measured cannot give {len(joint.names)} parameters of laws")
+            raise ValueError(f"{count} measured numbers for {len(joint.names)} parameters of laws; use more lines")
         found = fit_laws(problem, joint)
         fit = describe_laws(found, joint)
     fit = replace(fit, data=compliance_data(found, problem, transform))
-    fit = fit.with_findings([*fit.findings, *bent])
+    unstated = [] if decay else unstated_window(fit)
+    fit = fit.with_findings([*fit.findings, *unstated, *bent])
     fit.issue_warnings()
     return fit
 
@@ -253,65 +257,9 @@ def _check_law_joint(joint: LawJoint, dofs: Sequence[str] | None) -> LawJoint:
         raise ValueError(f"dofs must name those of joint, {', '.join(joint.dofs)}, not {', '.join(names)}")
     if joint.mass:
         raise ValueError(
-            f"joint has a mass in {', '.join(joint.mass)}: FRFs at the joint cannot part it from the structures that "
-            "it moves with; leave it out, or give models of these to identify_model"
+            f"joint has a mass in {', '.join(joint.mass)}, which FRFs at the joint do not separate from the sides; "
+            "leave it out, or use identify_model"
         )
     if not joint.laws:
-        raise ValueError("joint has no law to fit: all DOFs are rigid")
+        raise ValueError("joint has no law to fit, all DOFs are rigid; give a law to at least one DOF")
     return LawJoint(joint.laws, joint.rigid, None, names)
-
-
-def _without_window(fit: Fit, decay: float) -> Fit:
-    """Return the fit of springs and dampers to FRFs of responses and forces that were weighted by exp(-decay t).
-
-    Parameters
-    ----------
-    fit : Fit
-        Of springs and dampers, with its likelihood.
-    decay : float
-        1/s.
-
-    Notes
-    -----
-    Of a linear structure the window shifts the frequency: FRFs are those at i w + decay. K* = k + (i w + decay) c is
-    then fitted as a stiffness k + decay c, and as c.
-    """
-    place = {(one.kind, one.row, one.column): i for i, one in enumerate(fit.parameters)}
-    back = np.eye(len(fit.parameters))
-    for (kind, row, column), i in place.items():
-        damper = place.get(("c", row, column))
-        if kind == "k" and damper is not None:
-            back[i, damper] = -decay
-    estimate = back @ fit.estimate
-    covariance = back @ fit.covariance @ back.T
-    moved = fit.estimate - estimate
-    seen = fit.intervals
-    assert isinstance(seen, Intervals)
-
-    def limits(i: int, probability: float) -> tuple[float, float]:
-        used = np.flatnonzero(back[i])
-        own = seen.of(seen.names[i], probability)
-        if used.size > 1 and np.isfinite(own).all():
-            both = seen.of_function(lambda values: float(back[i] @ values), used, probability)
-            if both is not None and np.isfinite(both).all():
-                return both
-        return own[0] - float(moved[i]), own[1] - float(moved[i])
-
-    def of_function(
-        function: Callable[[FloatArray], float], used: NDArray[np.intp], probability: float
-    ) -> tuple[float, float] | None:
-        on = np.flatnonzero(back[used].any(axis=0))
-        return seen.of_function(lambda values: function(back @ values), on, probability)
-
-    k_lines = fit.k_lines
-    if k_lines is not None:
-        damping: FloatArray = fit.damping_matrix
-        k_lines = k_lines - decay * damping
-    shown = tuple(
-        f"{one.name} by {value:.3g} {one.unit}" for one, value in zip(fit.parameters, moved, strict=True) if value
-    )
-    removed = Finding("window-removed", {"decay": decay, "shown": shown or "no stiffness"})
-    return replace(
-        fit, estimate=estimate, covariance=covariance, k_lines=k_lines,
-        intervals=Intervals(seen.names, limits, of_function), findings=(*fit.findings, removed),
-    )  # fmt: skip

@@ -11,6 +11,7 @@ from scipy.special import ndtri
 
 from jointfrf.dofs import parameter_name
 from jointfrf.identification.manifold.flexible_sides import JointAlone
+from jointfrf.identification.profile import Intervals
 from jointfrf.identification.result import Fit, SeenStiffness
 from jointfrf.kernel.arguments import FloatArray
 
@@ -41,7 +42,8 @@ def with_joint_alone(fit: Fit, alone: JointAlone) -> Fit:
     powers = np.array([1.0 if one.kind == "k" else 2.0 for one in fit.parameters])
     factor = np.array([root[a] * root[b] for a, b in places]) ** powers
     estimate = fit.estimate * factor
-    intervals = _Intervals(fit, alone, estimate, factor, powers, places)
+    names, own = [one.name for one in fit.parameters], _Intervals(fit, alone, estimate, factor, powers, places)
+    intervals = Intervals(names, lambda i, probability: own(probability)[names[i]], own.of_function)
     limits = intervals(0.95)
     errors = np.array([
         _error(one.kind == "k" and not one.is_cross, value, *limits[one.name], error * own)
@@ -108,10 +110,6 @@ class _Intervals:
         self.powers, self.places = powers, places
         #: K_dd C_dd, 1 without cross terms.
         self.coupling = fit.stiffness * _diagonal_of_inverse(fit)
-
-    def of(self, name: str, probability: float) -> tuple[float, float]:
-        """Return the interval of one parameter."""
-        return self(probability)[name]
 
     def of_function(
         self, function: Callable[[FloatArray], float], used: NDArray[np.intp], probability: float

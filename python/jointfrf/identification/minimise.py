@@ -54,7 +54,7 @@ class Squares(Protocol):
         """Return the sum; inf where there is none."""
 
     def linearised(self, x: FloatArray) -> Linearised:
-        """Return it with its derivatives."""
+        """Return it with its derivatives; NaN where there is no sum."""
 
 
 class Minimum(NamedTuple):

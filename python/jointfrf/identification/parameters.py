@@ -20,7 +20,8 @@ __all__ = ["CommonMean", "FitParameter", "ParameterOrigin", "ParameterVector", "
 ParameterOrigin = Literal["joint", "mean", "part", "attachment", "response", "force", "error"]
 
 
-#: Stiffnesses of the joint are sought within this factor of the stiffness that the substructures have there.
+#: Stiffnesses of the joint are sought within this factor of the stiffness that the substructures have there; other
+#: logarithms without a limit within this factor of their nominal value.
 _WIDEST = 1e6
 #: No step changes a logarithm, or standard deviations of a prior, by more than this; nor does the first of a profile a
 #: logarithm.
@@ -165,7 +166,8 @@ class ParameterVector:
         return found
 
     def _own(self, x: FloatArray) -> FloatArray:
-        found: FloatArray = np.where(self.is_log, np.exp(np.where(self.is_log, x, 0)), x * self.scale)
+        logs = np.where(self.is_log, np.clip(x, *self.bounds), 0)
+        found: FloatArray = np.where(self.is_log, np.exp(logs), x * self.scale)
         return np.asarray(np.clip(found, self.limits[0], self.limits[1]))
 
     def slope(self, x: FloatArray) -> FloatArray:
@@ -180,15 +182,17 @@ class ParameterVector:
 
     @cached_property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """The same in coordinates."""
-        lower, upper = self.limits
-        with np.errstate(divide="ignore"):
-            logs = [np.log(np.where(self.is_log, np.maximum(limit, 0), 1)) for limit in (lower, upper)]
-        return np.where(self.is_log, logs[0], lower / self.scale), np.where(self.is_log, logs[1], upper / self.scale)
+        """The same in coordinates, those of logarithms finite."""
+        value = np.where(self.is_log, self.values[self.free], 1)
+        lower, upper = (np.where(self.is_log, limit, 1) for limit in self.limits)
+        lower, upper = np.where(lower > 0, lower, value / _WIDEST), np.where(upper < np.inf, upper, value * _WIDEST)
+        logs, linear = (np.log(lower), np.log(upper)), [limit / self.scale for limit in self.limits]
+        return np.where(self.is_log, logs[0], linear[0]), np.where(self.is_log, logs[1], linear[1])
 
     def longest(self, x: FloatArray) -> FloatArray:
         """Return the largest steps of a minimiser: damping may be anything, but not at once."""
-        return np.where(self.is_log | self.has_prior, _LONGEST, _LONGEST * np.maximum(abs(x), 1))
+        of_prior = np.minimum(self.scale / np.where(self.is_log, self.values[self.free], self.scale), 1)
+        return _LONGEST * np.where(self.has_prior, of_prior, np.where(self.is_log, 1, np.maximum(abs(x), 1)))
 
     def value(self, i: int, x: FloatArray) -> float:
         """Return the value of one of the free parameters."""
@@ -196,7 +200,7 @@ class ParameterVector:
 
     def end(self, i: int, sign: int) -> float:
         """Return what one of them runs to where it has no limit below (-1) or above (1)."""
-        if self.is_log[i]:
+        if self.is_log[i] and self.fitted[i].origin in ("joint", "mean"):  # their limits are those of the search
             return np.inf if sign > 0 else 0.0
         return float(self.limits[sign > 0][i])
 
@@ -276,7 +280,7 @@ def joint_vector(joint: LawJoint, fixed: Sequence[str], joint_stiffness: FloatAr
     names = joint.names
     for name in fixed:
         if name not in names:
-            raise ValueError(f"fixed names {name!r}, which is no parameter of the joint: {', '.join(names)}")
+            raise ValueError(f"unknown parameter {name!r} in fixed; use one of {', '.join(names)}")
     size = dict(zip(joint.dofs, joint_stiffness.tolist(), strict=True))
     return ParameterVector(
         tuple(_of_joint(one, i, one.name not in fixed, size) for i, one in enumerate(joint.quantities))

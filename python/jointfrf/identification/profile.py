@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from jointfrf.identification.minimise import Linearised, Squares, minimise
+from jointfrf.identification.minimise import Linearised, Minimum, Squares, minimise
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["FunctionIntervals", "Intervals", "ProfileIntervals", "ProfiledCoordinates"]
@@ -23,7 +23,7 @@ _FAR_BELOW = 0.25
 #: Steps in search of a limit, and where squares cost little.
 _STEPS, _MANY_STEPS = 12, 30
 #: Linearisations at a value of the parameter that is held, and what a step promises at the last one.
-_HELD_STEPS, _HELD_LEAST = 6, 1e-2
+_HELD_STEPS, _HELD_LEAST = 24, 1e-2
 #: Step of a difference, in standard errors, and how far from its value a function may be that is held, likewise.
 _SLOPE, _HELD = 1e-3, 1e-2
 #: What brackets a limit may be as narrow as this share of how near squares must come to it.
@@ -85,7 +85,7 @@ class ProfileIntervals:
     ) -> None:
         self.squares, self.coordinates, self.x, self.cost = squares, coordinates, x, cost
         self.covariance, self.factor = covariance, factor
-        self.least = self._minimised if least is None else least
+        self.least = least
         self.steps = _STEPS if least is None else _MANY_STEPS
         self.parabola, self.near = (_PARABOLA, _NEAR) if least is None else (_PRECISE, _PRECISE)
 
@@ -107,6 +107,7 @@ class ProfileIntervals:
         along, variance = self.covariance[:, i] / own, own / self.squares.unit
         reach = min(float(np.sqrt(limit * variance)), self.coordinates.longest_reach(i))
         low, high = 0.0, np.inf
+        minimised: FloatArray | None = None  # the way to a minimum with the parameter held, for a change of it of 1
         quadratic = reach**2 / variance
         for step in range(self.steps):
             at_bound = sign * (self.x[i] + sign * reach - bound) >= 0
@@ -114,13 +115,18 @@ class ProfileIntervals:
                 reach = sign * (bound - self.x[i])
             there = self._there(sign * reach * along)
             excess = self._excess(self.squares.cost(there))
+            if minimised is not None and self._excess(self.squares.cost(self._there(reach * minimised))) < excess:
+                there = self._there(reach * minimised)
             if step == 0 and abs(excess / quadratic - 1) < self.parabola:
                 return self._value(i, sign * reach * np.sqrt(limit / excess))
             if excess > _FAR_BELOW * limit:
                 # The profile is no higher than squares anywhere on the way, nor than those with all others as they are.
                 excess = self._excess(self.squares.cost(self._there(np.eye(1, self.x.size, i)[0] * sign * reach)))
-            if excess > _FAR_BELOW * limit:
+            if excess > _FAR_BELOW * limit and self.least is not None:
                 excess = self._excess(self.least(there, i))
+            elif excess > _FAR_BELOW * limit:
+                found = self._minimised(there, i)
+                excess, minimised = self._excess(found.cost), (found.x - self.x) / reach
             # Beyond a parameter that cannot be negative squares rise like a wall.
             if abs(excess / limit - 1) < self.near or high - low < _WALL * self.near * reach:
                 break
@@ -160,9 +166,12 @@ class ProfileIntervals:
             if abs(excess / limit - 1) < self.parabola:
                 ends.append(function(self._there(sign * reach * np.sqrt(limit / excess) * along)))
                 continue
+            minimised = sign * along  # the way to a minimum with the function held, for a change of it of 1
             for _ in range(_STEPS):
                 held = _HeldFunction(self.squares, function, best + sign * reach, variance)
-                there = minimise(held, there, None, _HELD_STEPS, _HELD_LEAST).x
+                starts = [self._there(reach * way) for way in (minimised, sign * along)]
+                there = minimise(held, min(starts, key=held.cost), None, _HELD_STEPS, _HELD_LEAST).x
+                minimised = (there - self.x) / reach
                 excess = self._excess(self.squares.cost(there))
                 if abs(excess / limit - 1) < self.near:
                     break
@@ -171,11 +180,19 @@ class ProfileIntervals:
                 reach = (
                     min(guess, 4 * reach) if high == np.inf else float(np.clip(guess, *(low + (high - low) * _INSIDE)))
                 )
+            else:
+                if low == 0:  # no value was found that is not excluded: the squares were not minimised
+                    return None
             ends.append(best + sign * reach if high < np.inf or excess > (1 - 2 * self.near) * limit else sign * np.inf)
         return ends[0], ends[1]
 
-    def _minimised(self, start: FloatArray, i: int) -> float:
-        return minimise(self.squares, start, i, _HELD_STEPS, _HELD_LEAST).cost
+    def _minimised(self, start: FloatArray, i: int) -> Minimum:
+        found = minimise(self.squares, start, i, _HELD_STEPS, _HELD_LEAST)
+        if np.isfinite(found.cost):
+            return found
+        # The linear prediction of the others left the range in which there is a model.
+        alone = np.where(np.arange(start.size) == i, start, self.x)
+        return minimise(self.squares, alone, i, _HELD_STEPS, _HELD_LEAST)
 
     def _there(self, step: FloatArray) -> FloatArray:
         return np.asarray(np.clip(self.x + step, *self.squares.bounds))
@@ -206,6 +223,8 @@ class _HeldFunction:
     def linearised(self, x: FloatArray) -> Linearised:
         """Return it with its derivatives; the function's by differences."""
         at = self.squares.linearised(x)
+        if not np.isfinite(at.cost):
+            return at
         steps = _SLOPE / np.sqrt(np.maximum(np.diagonal(at.information) / self.unit, np.finfo(float).tiny))
         ends = [(self.function(x + step), self.function(x - step)) for step in steps * np.eye(x.size)]
         slope = np.array([one - other for one, other in ends]) / (2 * steps)

@@ -54,8 +54,8 @@ class _KnownIntervals:
                 return intervals
         levels = ", ".join(f"{known:g}" for known in sorted(self.by_probability))
         raise ValueError(
-            f"probability {probability:g}: this fit was read from a file or a dictionary, which keeps its intervals at "
-            f"{levels} only, as they follow from the FRFs; name it in `probabilities` where the fit is saved"
+            f"probability {probability:g}: this fit was loaded and has its intervals at {levels} only; save it with "
+            "`probabilities`"
         )
 
 

@@ -25,17 +25,21 @@ from jointfrf.laws.law_joint import LawJoint
 from jointfrf.messages.finding import Finding, WithFindings, as_warning, worst_first
 
 __all__ = [
+    "UNDETERMINED",
     "Fit",
     "FittedParameter",
     "IntervalsByProbability",
     "SeenStiffness",
     "columns_of",
+    "is_undetermined",
     "joint_of",
     "law_parameters",
 ]
 
 #: From a probability to the interval of each parameter.
 IntervalsByProbability = Callable[[float], dict[str, tuple[float, float]]]
+#: What tables show of a parameter whose interval has no bound.
+UNDETERMINED = "undetermined"
 #: Columns of a printed fit: those of a terminal.
 _WIDTH = 80
 
@@ -313,8 +317,8 @@ class Fit(WithFindings):
         (('left', 'right'), ['left.k_x', 'right.k_x', 'left.c_x', 'right.c_x'], ['k_x', 'c_x'])
         """
         if point not in self.points:
-            known = f"only {', '.join(self.points)}" if self.points else "the DOFs have none, such as bolt1.y"
-            raise ValueError(f"there is no joint point {one_line(point)}, {known}")
+            known = f"use one of {', '.join(self.points)}" if self.points else "name DOFs by points, such as bolt1.y"
+            raise ValueError(f"unknown joint point {one_line(point)}; {known}")
         point = next((group[0] for group in self.same if point in group), point)
         at = [d for d, dof in enumerate(self.dofs) if point_and_direction(dof)[0] == point]
         own = {self.dofs[d]: point_and_direction(self.dofs[d])[1] for d in at}
@@ -476,7 +480,7 @@ class Fit(WithFindings):
         for one in self.parameters:
             if one.name == parameter:
                 return one.unit
-        raise ValueError(f"there is no parameter {one_line(parameter)}, only {', '.join(self._names)}")
+        raise ValueError(f"unknown parameter {one_line(parameter)}; use one of {', '.join(self._names)}")
 
     def __str__(self) -> str:
         """Return the worst finding, a table of the parameters with their intervals, and all other findings."""
@@ -485,14 +489,12 @@ class Fit(WithFindings):
         rows = [("parameter", "value", "std error", "95 % interval", *(["prior"] if has_prior else []), "unit")]
         for one in self.parameters:
             low, high = intervals[one.name]
-            shown, error = _with_error(self.value[one.name], errors[one.name], low, high)
+            shown = _with_interval(self.value[one.name], errors[one.name], low, high)
             prior = "" if one.prior is None else f"{one.prior[0]:.4g} +- {one.prior[1]:.2g}"
-            limits = f"{low:.4g} .. {high:.4g}"
-            rows.append((one.name, shown, error, limits, *([prior] if has_prior else []), one.unit))
+            rows.append((one.name, *shown, *([prior] if has_prior else []), one.unit))
         for name, eta in self.loss_factors.items():
-            limits = f"{eta.low:.4g} .. {eta.high:.4g}"
-            shown, error = _with_error(eta.value, eta.std_error, eta.low, eta.high)
-            rows.append((name, shown, error, limits, *([""] if has_prior else []), "1"))
+            shown = _with_interval(eta.value, eta.std_error, eta.low, eta.high)
+            rows.append((name, *shown, *([""] if has_prior else []), "1"))
         channels = f", {len(self.responses)} responses x {len(self.forces)} forces" if self.responses else ""
         span = f"{self.freq_hz.min():g} to {self.freq_hz.max():g} Hz, {self.freq_hz.size} lines"
         worst, *others = [_wrapped(f"warning: {text}") for text in self.warnings] or [""]
@@ -514,15 +516,25 @@ class Fit(WithFindings):
         rows: list[tuple[str, ...]] = [heading]
         for name, one in self.seen.items():
             shares = (f"{100 * share:.0f} %" for share in (one.sides, one.inertia, one.noise))
-            limits = f"{one.low:.4g} .. {one.high:.4g}"
-            rows.append((name, f"{one.value:.5g}", limits, self.unit(name), *shares))
+            value, _, limits = _with_interval(one.value, 0.0, one.low, one.high)
+            rows.append((name, value, limits, self.unit(name), *shares))
         return rows
 
 
-def _with_error(value: float, error: float, low: float, high: float) -> tuple[str, str]:
-    """Return a value and its standard error as shown: an open interval has only a best estimate."""
+def is_undetermined(low: float, high: float) -> bool:
+    """Whether an interval has no bound: the data do not determine the parameter."""
+    return not np.isfinite(high) and (low == 0 or not np.isfinite(low))
+
+
+def _with_interval(value: float, error: float, low: float, high: float) -> tuple[str, str, str]:
+    """Return a value, its standard error and interval as shown: with one bound there is only a best estimate."""
+    if is_undetermined(low, high):
+        return UNDETERMINED, "", ""
     is_open = not (np.isfinite(low) and np.isfinite(high))
-    return (f"~{value:.2g}", "") if is_open else (f"{value:.5g}", f"{error:.2g}")
+    limits = f"{low:.4g} .. {high:.4g}"
+    if is_open:
+        return f"~{value:.2g}" if np.isfinite(value) else UNDETERMINED, "", limits
+    return f"{value:.5g}", f"{error:.2g}", limits
 
 
 def _matrix(dofs: tuple[str, ...], parameters: Sequence[FittedParameter], values: FloatArray, kind: str) -> FloatArray:

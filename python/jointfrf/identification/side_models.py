@@ -218,7 +218,9 @@ def _of_sides(transform: FloatArray, what: str, sides: tuple[SideModel, SideMode
         own = np.flatnonzero(transform[side * n : (side + 1) * n].any(axis=0))
         count = len(getattr(model, what))
         if count != own.size:
-            raise ValueError(f"side {'jk'[side]} has {count} {what} in its model, and {own.size} in the FRFs")
+            raise ValueError(
+                f"side {'jk'[side]} has {count} {what} in its model, {own.size} in the FRFs; name all of them"
+            )
         found.append(own)
     return found
 
@@ -316,7 +318,7 @@ def corrected_frfs(
     noise = np.sqrt(_spread_at_joint(t_u**2 @ np.where(np.isfinite(variance), variance, 0) @ (t_f**2).T, left, right))
     bad = ~(_is_finite(at_joint) & _is_finite(smooth_at_joint))
     if bad.all():
-        raise ValueError("the models give no FRFs between channels and joint on any line: look at their DOFs")
+        raise ValueError("the models give no FRFs between channels and joint on any line; check their DOFs")
     at_joint[bad], smooth_at_joint[bad] = gamma[bad], smooth_gamma[bad]
     variance = np.where(bad[:, None, None], np.inf, variance)
     left[bad] = right[bad] = np.eye(2 * n)

@@ -35,6 +35,7 @@ from jointfrf.io.uff_function import (
     place_fields,
     read_header,
 )
+from jointfrf.io.uff_window import note_exponential_windows
 from jointfrf.io.units import parse_frequency_unit
 from jointfrf.kernel.arguments import check_type
 from jointfrf.spelling import some_of
@@ -205,6 +206,7 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfSet:
     if axes:
         limit.take(matrix.bytes(freq_hz.size))
         responses, excitations, h, coherence = _in_global_axes(file, axes, matrix, h, coherence)
+    note_exponential_windows(file)
     stated = _some(frf.stated for frf in first)
     found = FrfSet(freq_hz, responses, excitations, h, common, coordinates, str(path), coherence, None, stated)
     left_out: list[str] = []

@@ -18,7 +18,7 @@ from jointfrf.files import write_file
 from jointfrf.frf.calibration import shows_calibration
 from jointfrf.identification.fit_cards import cards
 from jointfrf.identification.fit_data import FitData, ModelData
-from jointfrf.identification.result import Fit, FittedParameter
+from jointfrf.identification.result import UNDETERMINED, Fit, FittedParameter, is_undetermined
 from jointfrf.io.cards import CardFormat
 from jointfrf.kernel.arguments import FloatArray, check_type
 from jointfrf.kernel.call import get_engine
@@ -638,11 +638,15 @@ def parameter_table(fit: Fit) -> Table:
         ends: tuple[Cell, ...] = tuple(limit if np.isfinite(limit) else "open" for limit in (low, high))
         error: Cell = "" if is_open else errors[term.name]
         shown: Cell = f"about {value:.2g}" if is_open else value
+        if is_undetermined(low, high):
+            shown, ends = UNDETERMINED, ("", "")
         prior = "" if term.prior is None else f"{term.prior[0]:.4g} ± {term.prior[1]:.2g}"
         believed = (prior,) if has_prior else ()
         rows.append((shown_name(term), shown, error, *ends, *believed, term.unit))
     for name, eta in fit.loss_factors.items():
-        rows.append((name, eta.value, eta.std_error, eta.low, eta.high, *([""] if has_prior else []), "1"))
+        known: tuple[Cell, ...] = (eta.value, eta.std_error, eta.low, eta.high)
+        shown_eta = (UNDETERMINED, "", "", "") if is_undetermined(eta.low, eta.high) else known
+        rows.append((name, *shown_eta, *([""] if has_prior else []), "1"))
     note = "K*(ω) = k + i h + i ω c, time convention exp(+iωt)"
     note += "; η = h/k" if fit.loss_factors else ""
     if any(term.origin == "joint" and term.kind not in get_args(ParameterKind) for term in fit.parameters):

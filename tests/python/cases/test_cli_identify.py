@@ -119,22 +119,6 @@ def test_hammer_test_that_comes_with_the_project(of_bars):
         assert word in result.stdout
 
 
-def test_an_exponential_window_is_taken_off():
-    fits = []
-    for words in ((), ("--window-decay", "5")):
-        result = run(BARS, *JOINT_OF_BARS, "--damping", "viscous", *words, "--json")
-        (fit,) = json.loads(result.stdout)["fits"]
-        fits.append({name: one["value"] for name, one in fit["parameters"].items()})
-    assert "an exponential window, exp(-5 t), adds" in " ".join(fit["notes"])
-    for dof in ("y", "theta_z"):
-        assert fits[1][f"k_{dof}"] == pytest.approx(fits[0][f"k_{dof}"] - 5 * fits[0][f"c_{dof}"], rel=1e-9)
-
-
-def test_a_window_is_ignored_by_other_methods():
-    result = run(BARS, *JOINT_OF_BARS, "--method", "inverse-substructuring", "--window-decay", "5")
-    assert "--window-decay" in result.stderr
-
-
 @pytest.mark.parametrize(
     ("words", "missing"),
     [

@@ -142,7 +142,7 @@ def test_a_point_alone_and_files(own, tmp_path):
     assert jf.cards(point, "nastran", (21, 22)).splitlines()[-1] == text.splitlines()[-1]
     with pytest.raises(ValueError, match=r"nodes must map each joint point, bolt1, bolt2, to its nodes"):
         jf.cards(fit, "nastran", (11, 12))
-    with pytest.raises(ValueError, match=r"there is no joint point 'bolt3', only bolt1, bolt2"):
+    with pytest.raises(ValueError, match=r"unknown joint point 'bolt3'; use one of bolt1, bolt2"):
         fit.at_point("bolt3")
     json.dumps(jf.fit_to_dict(fit), allow_nan=False)
 
@@ -151,9 +151,9 @@ def test_a_point_alone_and_files(own, tmp_path):
     ("options", "message"),
     [
         (dict(dofs=["y", "a", "b", "c"], cross="points"), 'cross "points" needs DOFs of points, such as "bolt1.y"'),
-        (dict(same=["bolt1", "bolt3"]), "same names 'bolt3', which is no point of a DOF"),
+        (dict(same=["bolt1", "bolt3"]), "unknown point 'bolt3' in same; use one of bolt1"),
         (dict(same=["bolt1"]), "same must name at least two points, each once"),
-        (dict(same=["bolt1", "bolt2"], cross="ignore"), 'cross "ignore" does not go with it'),
+        (dict(same=["bolt1", "bolt2"], cross="ignore"), 'cross "ignore" does not go with same'),
         (dict(same=["bolt1", "bolt2"], damping=["none", "none", "both", "none"]), "must have the same DOFs and terms"),
     ],
 )

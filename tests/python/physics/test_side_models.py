@@ -224,7 +224,7 @@ def test_a_hammer_test_of_two_blocks_holds_by_models(softer, seed):
 def test_wrong_models_are_named():
     sides, (one, other) = side_models(), interfaces()
     h = whole(JOINT, SENSORS, IMPACTS)
-    with pytest.raises(ValueError, match="side j has 2 responses in its model, and 3 in the FRFs"):
+    with pytest.raises(ValueError, match="side j has 2 responses in its model, 3 in the FRFs; name all of them"):
         corrected(h, (replace(sides[0], responses=sides[0].responses[:2]), sides[1]))
     part = jf.Substructure(beams()[0], ["31:y"])
     with pytest.raises(ValueError, match="side j has 1 joint DOFs in its model, not 2"):

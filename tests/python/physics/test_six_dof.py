@@ -166,7 +166,7 @@ def test_units_know_every_way_to_write_a_rotation():
     assert [term.unit for term in fit.parameters] == [
         entry["unit"] for entry in jf.fit_to_dict(fit)["parameters"].values()
     ]
-    with pytest.raises(ValueError, match="there is no parameter 'stiffness', only k_"):
+    with pytest.raises(ValueError, match="unknown parameter 'stiffness'; use one of k_"):
         fit.unit("stiffness")
 
 

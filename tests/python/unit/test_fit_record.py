@@ -69,7 +69,7 @@ def test_a_loaded_fit_goes_on(fits, beams, tmp_path):
 
 def test_a_loaded_fit_says_which_intervals_it_has(fits):
     fit = fits["open"]
-    with pytest.raises(ValueError, match=r"0\.8: this fit was read.* at 0\.5, 0\.6827, 0\.9, 0\.95"):
+    with pytest.raises(ValueError, match=r"0\.8: this fit was loaded.* at 0\.5, 0\.6827, 0\.9, 0\.95"):
         jf.fit_from_dict(jf.fit_to_dict(fit)).confidence_interval(0.8)
     more = jf.fit_from_dict(jf.fit_to_dict(fit, probabilities=[0.8]))
     assert more.confidence_interval(0.8) == fit.confidence_interval(0.8)

@@ -71,17 +71,17 @@ NOTHING = {
         lambda s, h, x: (s.freq, same(x, 0, 2)), {}, "the responses j:y and k:y are the same numbers, noise included"
     ),
     "a transform of one DOF twice": (
-        lambda s, h, x: (s.freq, x), {"transform": np.eye(4)[[0, 0, 2, 3]]}, "transform: 4 joint DOFs .* show 3 only"
+        lambda s, h, x: (s.freq, x), {"transform": np.eye(4)[[0, 0, 2, 3]]}, "channels show 3 of 4"
     ),
     "a transform of one side twice": (
-        lambda s, h, x: (s.freq, x), {"transform": np.eye(4)[[0, 1, 0, 1]]}, "come from channels that show 2 only"
+        lambda s, h, x: (s.freq, x), {"transform": np.eye(4)[[0, 1, 0, 1]]}, "channels show 2 of"
     ),
     "one of two transforms": (
-        lambda s, h, x: (s.freq, x), {"transform": (np.eye(4), np.eye(4)[[0, 1, 2, 2]])}, r"transform\[1\]: .* 3 only"
+        lambda s, h, x: (s.freq, x), {"transform": (np.eye(4), np.eye(4)[[0, 1, 2, 2]])}, "channels show 3"
     ),
     "virtual points of one sensor twice": (
         lambda s, h, x: (s.freq, jf.pollute(TWICE @ h @ TWICE.T, 0.01, seed=3)),
-        {"transform": np.linalg.pinv(TWICE)}, "come from channels that show 2 only",
+        {"transform": np.linalg.pinv(TWICE)}, "channels show 2 of",
     ),
     "noise": (lambda s, h, x: (s.freq, circular(x.shape)), {}, "gamma consists of noise"),
     "noise made reciprocal": (
@@ -113,7 +113,7 @@ def test_no_result_from_nothing(beams, what):
 def test_fewer_equations_than_parameters(chains):
     """A line of one DOF gives one complex equation: three FRFs less two that are free."""
     h = jf.pollute(chains.gamma(chains.joint), 0.01, seed=1)
-    with pytest.raises(ValueError, match=r"2 real equations \(one line, 4 Hz, .*\) for 3 parameters"):
+    with pytest.raises(ValueError, match=r"2 real equations \(one line, 4 Hz\) for 3 parameters"):
         identified(chains.freq[70:71], h[70:71], ["x"], damping="both")
     assert identified(chains.freq[70:90:4], h[70:90:4], ["x"], damping="both").parameters
 

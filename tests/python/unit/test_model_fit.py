@@ -499,11 +499,11 @@ def test_polynomials_of_matrices_and_their_derivatives():
         ({"responses": ["4:y"]}, "names begin with 'A/' or 'B/'"),
         ({"responses": ["A/4:y", "B/6:y"]}, "h must have 2 responses and 1 forces"),
         ({"responses": []}, "responses must name at least one DOF"),
-        ({"fixed": ["k_x"]}, "fixed names 'k_x', which is no parameter of the joint"),
-        ({"fixed": list(PLAIN_NAMES)}, "there is nothing to fit"),
+        ({"fixed": ["k_x"]}, "unknown parameter 'k_x' in fixed; use one of"),
+        ({"fixed": list(PLAIN_NAMES)}, "nothing to fit"),
         ({"noise": -1.0}, "noise must be positive"),
         ({"noise": 0.1, "averages": 4}, "coherence and averages are used where noise is not given"),
-        ({"force_gains": {"A/4:y": jf.Unknown(1.0)}}, "force_gains names 'A/4:y', which is no force"),
+        ({"force_gains": {"A/4:y": jf.Unknown(1.0)}}, "unknown force 'A/4:y' in force_gains; use one of"),
         ({"bad": np.nan}, r"h\[3, 0, 0\] at 36 Hz is not finite"),
     ],
 )
@@ -524,7 +524,7 @@ def test_what_is_wrong_is_one_sentence(change, message):
         (lambda: jf.Unknown(1.0, lower=2.0), "value must lie in 2 to inf"),
         (
             lambda: jf.Substructure(arm(), ["7:y"], {"length": jf.Unknown(1.0)}, exact=True),
-            "give a function that builds it",
+            "unknown name 'length'; use one of .* or a function that builds the model",
         ),
         (
             lambda: jf.Assembly(

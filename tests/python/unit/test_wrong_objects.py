@@ -137,7 +137,7 @@ def realised(**options):
         (lambda: swept(plan=1, jobs=1), "plan must be a SweepPlan, not int"),
         (lambda: jf.smooth_frfs([], np.zeros((0, 1, 1))), "h has no FRFs, its shape is 0 x 1 x 1"),
         (lambda: fitted_law(dofs=np.zeros((2, 2))), "dofs must be a sequence of names, not"),
-        (lambda: fitted_law(cross=np.zeros(2)), "joint says which laws are fitted"),
+        (lambda: fitted_law(cross=np.zeros(2)), "do not go with joint, which states the laws"),
         (lambda: jf.write_joint("a\nb", jf.Joint([1.0])), r"name a file that ends in .toml, not 'a\\nb'"),
         (lambda: half_model().modes(), "stiffness holds its upper triangle only"),
         (lambda: half_model().natural_frequencies(1), "stiffness holds its upper triangle only"),

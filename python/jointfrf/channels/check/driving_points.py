@@ -94,7 +94,8 @@ def circles(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -> Circles:
         return Circles(0.0, 0.0, 0)
     # Flattened, so that a rigid-body line at the lowest frequencies does not outweigh the resonances.
     own = h[:, use]
-    own = own * omega[:, None] ** -mean_exponent(omega, own)
+    # About the middle of the band: in a narrow one the exponent is large, and powers of w overflow.
+    own = own * (omega[:, None] / np.sqrt(omega.min() * omega.max())) ** -mean_exponent(omega, own)
     size = (own.real**2 + own.imag**2).sum(axis=0)
     turned = (own.real[:-1] * own.imag[1:] - own.imag[:-1] * own.real[1:]).sum(axis=0) / size
     return Circles(float(np.median(turned)), float((turned > 0).mean()), int(use.sum()))

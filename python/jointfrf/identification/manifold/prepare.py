@@ -38,6 +38,7 @@ __all__ = [
     "check_joint_seen",
     "check_transform",
     "prepare_compliance",
+    "shown_percent",
 ]
 
 #: FRFs that differ less than this from their transpose were made reciprocal.
@@ -62,7 +63,7 @@ class FitOptions:
                 check_choice("damping", word, get_args(DampingTerms))
         check_choice("cross", self.cross, get_args(CrossTerms))
         if self.same and self.cross == "ignore":
-            raise ValueError('same takes the joints of points as a whole: cross "ignore" does not go with it')
+            raise ValueError('cross "ignore" does not go with same, which fits joints as a whole; leave one out')
 
 
 @dataclass(frozen=True)
@@ -145,8 +146,8 @@ def _check_points(options: FitOptions, dofs: tuple[str, ...]) -> None:
         raise ValueError(f'cross "points" needs DOFs of points, such as "bolt1.y", not {", ".join(dofs)}')
     for point in (point for own in options.same for point in own):
         if point not in points:
-            known = f"the DOFs have {', '.join(sorted(points))}" if points else f"{', '.join(dofs)} have none"
-            raise ValueError(f'same names {point!r}, which is no point of a DOF like "bolt1.y": {known}')
+            known = f"use one of {', '.join(sorted(points))}" if points else 'name DOFs by points, such as "bolt1.y"'
+            raise ValueError(f"unknown point {point!r} in same; {known}")
 
 
 def prepare_compliance(
@@ -277,8 +278,8 @@ def check_transform(name: str, transform: FloatArray, labels: list[str]) -> None
     rank = int(np.linalg.matrix_rank(transform / size, tol=_RANK))
     if rank < len(transform):
         raise ValueError(
-            f"{name}: {len(transform)} joint DOFs ({', '.join(labels)}) come from channels that show {rank} only: "
-            "channels are the same, or do not see one of the DOFs"
+            f"{name}: channels show {rank} of {len(transform)} joint DOFs ({', '.join(labels)}); add channels in other "
+            "places or directions"
         )
 
 
@@ -294,7 +295,7 @@ def check_channels(gamma: ComplexArray, labels: list[str]) -> None:
         seen = of_h.any(axis=(0, 2))
         if not seen.all():
             dead = [labels[i] for i in np.flatnonzero(~seen)]
-            raise ValueError(f"gamma: the {what} {', '.join(dead)} are zero: nothing was measured there")
+            raise ValueError(f"gamma: the {what} {', '.join(dead)} are zero; measure them or leave them out")
         product = _products(h, of_h)
         sides = slice(0, half), slice(half, 2 * half)
         values, vectors = np.linalg.eigh(np.array([product[side, side] for side in sides]))
@@ -302,8 +303,8 @@ def check_channels(gamma: ComplexArray, labels: list[str]) -> None:
             if least < _DEPENDENT:
                 own = np.array(labels[side])[abs(vector) > 1e-3].tolist()
                 raise ValueError(
-                    f"gamma: the {what} {', '.join(own)} are not independent: one of these DOFs is the others measured "
-                    "again, or their sum"
+                    f"gamma: the {what} {', '.join(own)} are not independent; leave out the one that repeats "
+                    "others, or their sum"
                 )
         for i in range(half):
             # The lower eigenvalue of the products of two rows of norm 1.
@@ -350,20 +351,20 @@ def check_joint_seen(freq: FloatArray, smooth: ComplexArray, variance: FloatArra
     level = float(medians(noise.ravel()))
     if level >= _HIDDEN:
         raise ValueError(
-            f"gamma consists of noise ({span}: the noise of driving points is {_percent(level)} of what is smooth in "
-            "them): nothing can be identified from it"
+            f"gamma consists of noise: {shown_percent(level)} of the driving points ({span}); measure more averages or "
+            "another band"
         )
     across = squares > ZERO**2 * np.maximum(driving[:, :, None] * driving[:, None, :], _TINY)
     if not across[:, :n, n:].any() and not across[:, n:, :n].any():
         raise ValueError(
-            f"gamma is zero between sides j and k of the joint ({span}): no joint connects them, or DOFs j and k are "
-            "not where they are said to be"
+            f"gamma is zero between sides j and k of the joint ({span}); check that a joint connects them, and the "
+            "order of DOFs"
         )
     seen = (squares > _HIDDEN**2 * variance).mean(axis=0) > _SEEN
     if not seen[:n, n:].any() and not seen[n:, :n].any():
         raise ValueError(
-            f"gamma between sides j and k of the joint consists of noise ({span}): no joint is seen, or the noise "
-            "hides it"
+            f"gamma between sides j and k of the joint consists of noise ({span}); measure more averages or another "
+            "band"
         )
 
 
@@ -384,23 +385,24 @@ def check_estimate(found: JointEstimate, level: float, span: str, *, is_level_kn
         equations, unknowns = 2 * group.equations, group.x.size
         if equations < unknowns:
             raise ValueError(
-                f"gamma gives {equations:.0f} real equations ({span}, without those that no joint fits) for {unknowns} "
-                "parameters of the joint: more lines are needed, or fewer parameters"
+                f"gamma gives {equations:.0f} real equations ({span}) for {unknowns} parameters of the joint; use more "
+                "lines or fewer parameters"
             )
     ratio = float(np.sqrt(max(found.excess, 0.0)))
     left = ratio * level
     if left > _NO_FIT and (ratio > _FAR or not is_level_known):
         raise ValueError(
-            f"no joint was found that fits gamma ({span}): {_percent(left)} of the FRFs is left: look at the order and "
-            "places of channels (check_frfs), at transform, and at the noise that was said"
+            f"no joint was found that fits gamma ({span}): {shown_percent(left)} of the FRFs is left; check the order "
+            "and places of channels (check_frfs), transform and noise"
         )
     variance = np.diagonal(found.covariance)
     names = [
         one.name for one, v, x in zip(found.parameters, variance, found.theta, strict=True) if not (v > 0 and x == x)
     ]
     if names:
-        raise ValueError(f"gamma does not determine {', '.join(names)} ({span}): no standard error can be given")
+        raise ValueError(f"gamma does not determine {', '.join(names)} ({span}); use more lines or fewer parameters")
 
 
-def _percent(share: float) -> str:
+def shown_percent(share: float) -> str:
+    """Return a share in percent, in words where it is far above 1."""
     return f"{100 * share:.0f} %" if share < 10 else "far more than 100 %"

@@ -329,9 +329,10 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
         residual, predicted = _residual(problem, likelihood, minimum)
         with_error = _test(problem, likelihood, minimum, residual, predicted)
     vector, n = likelihood.vector, likelihood.vector.n_shown
-    # Of logarithms none: far away they may well be seen.
+    # Of logarithms of the joint none: far away they may well be seen.
     least = (_BLIND * np.maximum(1.0, 1 / vector.scale)) ** -2
-    blind = ~vector.is_log & (np.diagonal(minimum.information) <= least)
+    of_joint = np.array([one.origin in ("joint", "mean") for one in vector.fitted], bool)
+    blind = ~(vector.is_log & of_joint) & (np.diagonal(minimum.information) <= least)
     if blind.any():
         # What they were believed to be is as good as where rounding has led.
         believed = np.where(blind, vector.to_coordinates(vector.values), minimum.x)

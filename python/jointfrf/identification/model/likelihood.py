@@ -76,8 +76,12 @@ class WeightedResiduals(ABC):
         return squares if np.isfinite(squares) else np.inf
 
     def linearised(self, x: FloatArray) -> Linearised:
-        """Return the squares with information and gradient."""
-        return self.about(x, *self.prediction.linearised(self.vector, self.vector.to_values(x)))
+        """Return the squares with information and gradient; infinite squares without where `cost` has none."""
+        try:
+            predicted = self.prediction.linearised(self.vector, self.vector.to_values(x))
+        except np.linalg.LinAlgError:
+            return Linearised(np.inf, np.full((x.size, x.size), np.nan), np.full(x.size, np.nan))
+        return self.about(x, *predicted)
 
     def about(self, x: FloatArray, y: ComplexArray, slopes: ComplexArray) -> Linearised:
         """Return the same by the prediction and its derivatives, which may be changed."""

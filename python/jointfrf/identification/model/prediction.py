@@ -448,7 +448,9 @@ def parameter_vector(
             lower, upper = range_of(part, name, unknown)
             unit = "1" if name in part.scaled and unknown.value == 1 else _UNITS.get(name, "")
             own = _of_unknown(f"{side}/{name}", unit, "part", (side, name), unknown)
-            found.append(own._replace(lower=lower, upper=upper))
+            # There is no structure without stiffness or mass.
+            is_factor = name in part.scaled and name != "loss_factor"
+            found.append(own._replace(lower=max(lower, 0.0) if is_factor else lower, upper=upper, is_log=is_factor))
     _with_same(whole, found)
     for i, one in enumerate(whole.attachments):
         found += _of_attachment(one, i)

@@ -49,7 +49,7 @@ class Channels:
         ):  # fmt: skip
             for name, gain in gains.items():
                 if name not in names:
-                    raise ValueError(f"{what}_gains names {name!r}, which is no {what}: {', '.join(names)}")
+                    raise ValueError(f"unknown {what} {name!r} in {what}_gains; use one of {', '.join(names)}")
                 if not isinstance(gain, Unknown) or gain.value == 0:
                     raise ValueError(f"{what}_gains: {name} must be an Unknown about a factor that is not zero")
 
@@ -93,10 +93,10 @@ def prepare_model_fit(
     prediction = Prediction(whole, freq, channels.responses, channels.forces)
     vector = parameter_vector(whole, channels.gains(), tuple(fixed), prediction.joint_stiffness())
     if not vector.free.size:
-        raise ValueError("there is nothing to fit: all parameters of the joint are fixed, and nothing else is unknown")
+        raise ValueError("nothing to fit: all parameters of the joint are fixed; leave some out of fixed")
     if 2 * np.count_nonzero(np.isfinite(variance)) < vector.free.size:
         count = 2 * int(np.isfinite(variance).sum())
-        raise ValueError(f"{count} numbers measured cannot give {vector.free.size} unknowns")
+        raise ValueError(f"{count} measured numbers for {vector.free.size} unknowns; measure more, or fix some")
     at = _joint_channels(whole, channels, shown)
 
     def joint_start() -> FloatArray | None:

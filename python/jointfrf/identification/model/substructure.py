@@ -182,10 +182,10 @@ class Substructure:
             if not isinstance(unknown, Unknown):
                 raise TypeError(f"unknowns: {name} must be an Unknown, not {type(unknown).__name__}")
             if isinstance(self.source, FrfSource):
-                raise ValueError(f"FRFs have no unknowns such as {name!r}: give the substructure as a model")
+                raise ValueError(f"FRFs have no unknowns such as {name!r}; give the substructure as a model")
             if isinstance(self.source, Model) and name not in SCALES:
                 raise ValueError(
-                    f"a model takes the unknowns {', '.join(SCALES)}, not {name!r}: give a function that builds it"
+                    f"unknown name {name!r}; use one of {', '.join(SCALES)}, or a function that builds the model"
                 )
         if isinstance(self.source, Model):
             for name in ("youngs_modulus", "density"):
