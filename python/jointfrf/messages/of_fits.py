@@ -510,13 +510,13 @@ FIT_MESSAGES: Final[Mapping[str, Message]] = {
     ),
     "window-not-stated": Message(
         "warning",
-        "hysteretic damping of {dofs} falls like 1/frequency: an exponential window with sigma {of_accelerances:.2g} /s "
+        "hysteretic damping of {dofs} falls like 1/frequency: an exponential window of {of_accelerances:.2g} /s "
         "(accelerances) or {of_mobilities:.2g} /s (mobilities) explains it",
         "State the window with `--window-decay` (`window_decay=`)",
         means="An exponential window that was used in the test and not stated looks like hysteretic damping that falls "
         "with frequency.",
-        why="FRFs under a window exp(-sigma t) belong to s = i w + sigma. Without sigma, accelerances and mobilities are "
-        "divided by the wrong power of frequency.",
+        why="FRFs under a window exp(-sigma t) belong to s = i w + sigma. Without sigma, accelerances and mobilities "
+        "are divided by the wrong power of frequency.",
         do="Look up the decay of the exponential window in the analyser, and state it in 1/s.",
     ),
     "band-mean-error": Message(
