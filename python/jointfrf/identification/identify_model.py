@@ -173,9 +173,12 @@ def _look_at(problem: ModelProblem, channels: Channels) -> list[Finding]:
     if wrong is not None:
         return [wrong]
     some = spread_lines(problem.freq_hz.size)
+    shown = np.isfinite(problem.measured[0])
+    rows, columns = np.flatnonzero(shown.any(axis=1)), np.flatnonzero(shown.any(axis=0))
     check = check_frfs(
-        problem.freq_hz[some], problem.measured[some], responses=channels.responses, forces=channels.forces
-    )
+        problem.freq_hz[some], problem.measured[some][:, rows][:, :, columns],
+        responses=[channels.responses[i] for i in rows], forces=[channels.forces[i] for i in columns],
+    )  # fmt: skip
     unknown = {*channels.response_gains, *channels.force_gains}
     return [
         one for one in check.findings

@@ -178,8 +178,8 @@ def test_the_report_is_written_where_it_is_asked_for(tmp_path):
     [
         (["--j", "101,102", "--k", "201,202", "--dofs", "x"], "101:+x / 101:+x"),
         (["--j", "101,999", "--k", "201,202", "--dofs", "y"], "no FRF at node 999"),
-        (["--j", "101,103", "--k", "201,203", "--dofs", "y,theta_x"], "theta_x cannot be seen from nodes 101, 103"),
-        ([*JOINT_OF_BARS, "--band", "1700:1900"], "holds no frequency line"),
+        (["--j", "101,103", "--k", "201,203", "--dofs", "y,theta_x"], "theta_x cannot be found from nodes 101, 103"),
+        ([*JOINT_OF_BARS, "--band", "1700:1900"], "contains no frequency line"),
     ],
 )
 def test_what_is_missing_is_said_in_one_sentence(words, message, capsys):

@@ -299,11 +299,11 @@ def test_identify_looks_first(beams):
     [
         (dict(names=["a", "b"]), "names must name 4 different channels"),
         (dict(names=["a", "a", "b", "c"]), "names must name 4 different channels"),
-        (dict(responses=["a", "b", "c", "d"]), "responses and forces go together"),
-        (dict(names=list("abcd"), forces=list("abcd")), "names goes without"),
+        (dict(responses=["a", "b", "c", "d"]), "responses or forces are missing"),
+        (dict(names=list("abcd"), forces=list("abcd")), "names are of responses and forces alike"),
         (dict(fix=["all"]), "fix must be one of lines, time-convention"),
         (dict(blame="me"), "blame must be one of responses, forces"),
-        (dict(h=np.ones((786, 4, 3))), "4 responses and 3 forces: name them"),
+        (dict(h=np.ones((786, 4, 3))), "4 responses and 3 forces; name them"),
         (dict(freq_hz=[1.0]), r"freq_hz must have shape \(786\)"),
     ],
 )

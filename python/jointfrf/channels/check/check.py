@@ -177,7 +177,7 @@ def check_frfs(
     if joint is not None:
         check_type("joint", joint, JointChannels)
         if not all(other is None for other in (names, responses, forces, transform, dofs)):
-            raise ValueError("joint goes without names, responses, forces, transform and dofs")
+            raise ValueError("joint has its own channels; leave out names, responses, forces, transform and dofs")
         responses, forces = joint.responses.channels, joint.forces.channels
     rows, columns = as_channel_names(lines.shape[1:], names, responses, forces)
     if read_as is not None:
