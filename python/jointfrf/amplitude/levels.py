@@ -130,7 +130,7 @@ def levels(
     Parameters
     ----------
     fits : sequence of Fit
-        One for each level, of `identify` or `identify_model`, as they were made (not loaded); with `accept_bent` where
+        One for each level, of `identify` or `identify_model`, as they were made (not loaded); with `accept` if
         the amplitude changes over the lines, under a force held.
     drives : sequence of Drive
         What was held in each test.

@@ -568,13 +568,13 @@ def _check_known(frfs: FrfSet, places: Sequence[ChannelPlace]) -> None:
         check_type("place", place, ChannelPlace)
         where = f"{place.where}: " if place.where else ""
         if place.side is None:
-            raise ValueError(f"{where}channel {place.channel} has no side: j or k")
+            raise ValueError(f"{where}channel {place.channel} has no side; write j or k")
         if place.channel.is_rotation:
-            raise ValueError(f"{where}channel {place.channel} is a rotation, a virtual point needs translations")
+            raise ValueError(f"{where}channel {place.channel} is a rotation; use translations for a virtual point")
         for kind in ("response", "excitation") if place.role == "both" else (place.role,):
             key = place.channel.node, place.channel.axis, kind
             if key in seen:
-                raise ValueError(f"{where}channel {place.channel} is listed twice as {kind}")
+                raise ValueError(f"{where}channel {place.channel} is listed twice as {kind}; keep one row")
             seen[key] = place
         known = {
             "response": frfs.responses,
@@ -591,7 +591,7 @@ def _point(
 ) -> VirtualPoint:
     """Return the virtual point of the responses or excitations of a side."""
     if not places:
-        raise ValueError(f"side {side} of the joint has no {kind}s: name the nodes of sensors and of impacts")
+        raise ValueError(f"side {side} of the joint has no {kind}s; name the nodes of sensors and of impacts")
     positions = [_position(frfs, place) for place in places]
     weights = [place.weight for place in places]
     try:
@@ -608,7 +608,7 @@ def _position(frfs: FrfSet, place: ChannelPlace) -> NDArray[np.float64]:
     if node not in frfs.coordinates:
         where = f"{place.where}: " if place.where else ""
         raise ValueError(
-            f"{where}node {node} has no coordinates, neither in {frfs.source or 'the set'} nor in a table of channels"
+            f"{where}node {node} has no coordinates in {frfs.source or 'the set'}; add them to a table of channels"
         )
     return np.asarray(frfs.coordinates[node], dtype=np.float64)
 

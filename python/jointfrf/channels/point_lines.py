@@ -383,14 +383,14 @@ def _one_side(
         raise ValueError(f"a side of the joint needs different nodes, not {', '.join(map(str, points)) or 'none'}")
     missing = [node for node in points if node not in coordinates]
     if missing:
-        raise ValueError(f"node {missing[0]} has no coordinates")
+        raise ValueError(f"node {missing[0]} has no coordinates; add them")
     at = np.array([as_real(f"coordinates of node {node}", coordinates[node], (3,)) for node in points])
     middle = (at.min(axis=0) + at.max(axis=0)) / 2
     extent = np.ptp(at, axis=0)
     along = int(np.argmax(extent))
     if len(points) > 1 and np.delete(extent, along).max() > _STRAY * extent[along]:
         names = ", ".join(map(str, points))
-        raise ValueError(f"nodes {names} do not lie on one line parallel to an axis: name the points of one line")
+        raise ValueError(f"nodes {names} do not lie on one line parallel to an axis; name the points of one line")
 
     weights = np.vstack([np.ones(1), np.zeros(1)])
     if len(points) > 1:
@@ -415,7 +415,8 @@ def _rotation(about: int, points: Sequence[int], along: int, slope: FloatArray) 
     if len(points) < 2:
         raise ValueError(f"{dof} needs at least two nodes on each side, not {names}")
     if about == along:
-        raise ValueError(f"{dof} cannot be seen from nodes {names}: they lie along its axis {_AXES[along]}")
+        axis = _AXES[along]
+        raise ValueError(f"{dof} cannot be found from nodes {names} along its axis {axis}; name nodes off that axis")
     normal = np.cross(np.eye(3)[about], np.eye(3)[along])
     seen = int(np.argmax(abs(normal)))
     return seen, normal[seen] * slope

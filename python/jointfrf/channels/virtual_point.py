@@ -170,7 +170,7 @@ def virtual_point(
         raise ValueError(f"weights must not be negative: channel {int(np.argmax(weight < 0))} has {weight.min():g}")
     used = int(np.count_nonzero(weight))
     if used < len(names):
-        raise ValueError(f"positions hold {used} channels with weight: too few for {len(names)} DOFs")
+        raise ValueError(f"{used} channels with weight are too few for {len(names)} DOFs; add channels")
 
     reference = as_real("point", point, (3,))
     motion = np.einsum("mi,mij->mj", direction, rigid_motion(place, reference))
@@ -341,9 +341,9 @@ def channel_geometry(
     named = [Channel.parse(channel) for channel in channels]
     for channel in named:
         if channel.is_rotation:
-            raise ValueError(f"channels: {channel} is a rotation, a virtual point needs translations")
+            raise ValueError(f"channels: {channel} is a rotation; use translations for a virtual point")
         if channel.node not in coordinates:
-            raise ValueError(f"coordinates: node {channel.node} has none")
+            raise ValueError(f"node {channel.node} has no coordinates; add them to coordinates")
     places = [as_real(f"coordinates of node {c.node}", coordinates[c.node], (3,)) for c in named]
     axes = [c.sign * np.eye(3)["xyz".index(c.axis)] for c in named]
     # adding zero turns -0 to 0

@@ -36,6 +36,7 @@ __all__ = [
     "frfs_of_model",
     "is_model",
     "lines_of",
+    "measured_sets",
     "own_matrix",
     "read_structures",
     "run",
@@ -300,6 +301,11 @@ def read_structures(paths: Sequence[Path], freq_hz: FloatArray | None, **options
         is_global = isinstance(structure, ModalStructure)  # places in a model count from one of its ends
         found.append(frfs if is_global else replace(frfs, coordinates={}))
     return found
+
+
+def measured_sets(path_a: Path, a: FrfSet, path_b: Path, b: FrfSet) -> list[FrfSet]:
+    """Return the FRFs of files, without FRFs of models."""
+    return [frfs for path, frfs in ((path_a, a), (path_b, b)) if not is_model(path)]
 
 
 def own_matrix(frfs: FrfSet) -> tuple[tuple[Channel, ...], np.ndarray]:

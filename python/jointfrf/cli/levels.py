@@ -30,7 +30,7 @@ from jointfrf.cli.usage import (
     waiting,
     warn_of_ignored,
 )
-from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
+from jointfrf.errors import ConvergenceWarning, FileContentError, FrfCheckWarning, IdentificationWarning
 from jointfrf.extras import check_extras
 from jointfrf.files import write_file
 from jointfrf.identification.fit_data import FitData
@@ -38,6 +38,7 @@ from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_file import write_joint
 from jointfrf.identification.result import Fit
 from jointfrf.io.csv_file import read_text_table
+from jointfrf.messages.of_data import FATAL_CODES
 from jointfrf.report.levels_page import levels_csv, write_levels
 from jointfrf.spelling import did_you_mean
 
@@ -170,7 +171,7 @@ def run(args: argparse.Namespace) -> int:
     out.warn(*found.warnings)
     by_dof = {dof: [_by_name(one) for one in own] for dof, own in found.levels.items()}
     content = {"levels": by_dof, "failed": failures.found, "written": [str(path) for path in written]}
-    out.give(about | asdict(replace(found, joints={})) | content)
+    out.give(about | asdict(replace(found, joints={})) | found.content() | content)
     failures.complain()
     interrupt.resume()
     return 1 if found.refused or failures.found else 0
@@ -197,6 +198,7 @@ def _of_fits(args: argparse.Namespace, failures: Failures, interrupt: Interrupt)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they are among the findings
         warnings.simplefilter("ignore", ConvergenceWarning)
+        warnings.simplefilter("ignore", FrfCheckWarning)
         with waiting("tests") as count, interrupt.kept_back(fits):
             for done, test in enumerate(tests):
                 count(done, len(tests))
@@ -318,7 +320,7 @@ def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Driv
     if args.model is not None:
         measured = measured_assembly(args.model, frfs, bands=args.band)
         with waiting(f"fit of {test.path.name}"):
-            return measured.fit(noise=args.noise, accept_bent=True), drive
+            return measured.fit(noise=args.noise, accept=FATAL_CODES), drive
     joint = measured_joint(own, frfs)
     channels = [str(one) for one in joint.responses.channels]
     if drive.held == "response" and drive.channel not in channels:
@@ -328,7 +330,7 @@ def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Driv
         )
     with waiting(f"fit of {test.path.name}"):
         known = joint.known(frfs)
-        fit = identify(frfs.freq_hz, joint.h, joint.dofs, args.band, noise=args.noise, accept_bent=True, **known)
+        fit = identify(frfs.freq_hz, joint.h, joint.dofs, args.band, noise=args.noise, accept=FATAL_CODES, **known)
     if drive.held == "response" and isinstance(fit.data, FitData):
         drive = replace(drive, channel=fit.data.response_names[channels.index(drive.channel)])
     return fit, drive

@@ -144,7 +144,7 @@ def run(args: argparse.Namespace) -> int:
     out.say(pooled, *([""] if written else []), *(f"wrote {path}" for path in written))
     out.warn(*pooled.warnings)
     content = {"failed": failures.found, "written": [str(path) for path in written]}
-    out.give({"sources": sources, **asdict(pooled), **content})
+    out.give({"sources": sources, **asdict(pooled), **pooled.content(), **content})
     failures.complain()
     return 1 if failures.found else 0
 

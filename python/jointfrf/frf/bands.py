@@ -128,7 +128,7 @@ def in_bands(freq_hz: ArrayLike, bands: Sequence[Band]) -> NDArray[np.bool_]:
         here = (freq >= low) & (freq <= high)
         if not here.any():
             extent = f"they run from {freq.min():g} to {freq.max():g} Hz" if freq.size else "there are none"
-            raise ValueError(f"the band {low:g} to {high:g} Hz holds no frequency line; {extent}")
+            raise ValueError(f"the band {low:g} to {high:g} Hz contains no frequency line; {extent}")
         inside |= here
     return inside
 
@@ -256,7 +256,7 @@ def band_mean(
     for d, own in enumerate(as_bands(bands, names, freq)):
         inside = in_bands(freq, own)
         if (freq[inside] == 0).any():
-            raise ValueError(f"the band of {names[d]} holds 0 Hz, where Im K*/w is not defined")
+            raise ValueError(f"the band of {names[d]} contains 0 Hz, where Im K*/w is not defined; start above 0 Hz")
         k = lines[inside, d, d]
         stiffness[d] = k.real.mean()
         damping[d] = (k.imag / (2 * np.pi * freq[inside])).mean()

@@ -414,7 +414,7 @@ class FrfSet:
         """
         low, high = as_real("band", band, (2,)).tolist()
         if not low <= high:
-            raise ValueError(f"band ({low:g}, {high:g}) Hz does not increase")
+            raise ValueError(f"band ({low:g}, {high:g}) Hz does not increase; give the lower limit first")
         inside = (self.freq_hz >= low) & (self.freq_hz <= high)
         if not inside.any():
             held = f"the {self.freq_hz.size} lines are {self._range()}" if self.freq_hz.size else "there are none"
@@ -635,7 +635,7 @@ def check_apart(nodes_j: Sequence[int], nodes_k: Sequence[int]) -> None:
     """Raise if a node is on both sides of a joint."""
     shared = set(nodes_j) & set(nodes_k)
     if shared:
-        raise ValueError(f"node {min(shared)} is named on both sides of the joint")
+        raise ValueError(f"node {min(shared)} is named on both sides of the joint; name it on one")
 
 
 def places_of_nodes(frfs: FrfSet, nodes_j: Sequence[int], nodes_k: Sequence[int]) -> tuple[ChannelPlace, ...]:
@@ -678,6 +678,6 @@ def places_of_nodes(frfs: FrfSet, nodes_j: Sequence[int], nodes_k: Sequence[int]
         for node in dict.fromkeys(nodes):
             own = [channel for (at, _), channel in sorted(known.items()) if at == node]
             if not own:
-                raise ValueError(f"node {node} has no channel of a translation")
+                raise ValueError(f"node {node} has no channel of a translation; name another node")
             found += [ChannelPlace(channel, side) for channel in own]  # type: ignore[arg-type]
     return tuple(found)

@@ -67,7 +67,7 @@ def merge_frfs(sets: Sequence[FrfSet]) -> FrfSet:
     if not isinstance(sets, Sequence) or not all(isinstance(each, FrfSet) for each in sets):
         raise TypeError("sets must be a list of FrfSet")
     if not sets:
-        raise ValueError("there is no set of FRFs to merge")
+        raise ValueError("there is no set of FRFs to merge; give at least one")
     if len(sets) == 1:
         return sets[0]
     first = sets[0]

@@ -194,7 +194,7 @@ def realisations(
     except MemoryError as error:
         size = count * lines.nbytes / 2**30
         raise MemoryError(
-            f"count: {count} realisations of h take {size:.3g} GiB: draw them in parts by first and count"
+            f"count: {count} realisations of h take {size:.3g} GiB; draw them in parts with first and count"
         ) from error
     if polluted.size:
         n_freq, n_out, n_in = lines.shape
@@ -238,7 +238,7 @@ def _whole_seed(seed: int, rng: int | np.random.Generator | None) -> int:
     number, name = as_integer("seed", seed), "seed"
     if rng is not None:
         if number != 0:
-            raise ValueError("seed and rng are both given: one is enough")
+            raise ValueError("seed and rng are both given; give one")
         if isinstance(rng, np.random.Generator):
             return int(rng.integers(2**64, dtype=np.uint64))
         try:

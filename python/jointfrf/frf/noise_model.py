@@ -392,7 +392,7 @@ def _coherence_variance(h: ComplexArray, coherence: ArrayLike | None, averages: 
     """E|e|^2 by the coherence."""
     if coherence is None:
         if averages is not None:
-            raise ValueError("averages are used with coherence only: give coherence, too")
+            raise ValueError("averages need coherence; give coherence, too")
         return None
     squared = as_real("coherence", coherence, h.shape)
     if ((squared <= 0) | (squared > 1)).any():

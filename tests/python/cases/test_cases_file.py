@@ -48,7 +48,7 @@ CHANGES = [
     (
         "k_x = [[3.0, 9.0]]",
         "k_x = [[11.0, 12.0]]",
-        r"\[\[bands\]\] number 1: k_x: .*11 to 12 Hz holds no frequency line",
+        r"\[\[bands\]\] number 1: k_x: .*11 to 12 Hz contains no frequency line",
     ),
     ("k_x = [[3.0, 9.0]]", "k_x = [3.0, 9.0]", r"k_x must be a list of bands \[low, high\] in Hz"),
     ("k_x = [[3.0, 9.0]]", "k_x = [[9.0, 3.0]]", r"k_x must be a list of bands"),
@@ -98,7 +98,7 @@ SOLID_CHANGES = [
         r"\[\[observed\]\] number 1: dof must be one of Fx, Mtheta_y,",
     ),
     ('point = "s"\ndof = "Fz"', 'point = "s"\ndof = "Fy"', r"two tables \[\[observed\]\] name the same FRF"),
-    ("[[30.0, 90.0], ", "[[601.0, 700.0], ", r"\[\[observed\]\] number 1: bands: .*holds no frequency line"),
+    ("[[30.0, 90.0], ", "[[601.0, 700.0], ", r"\[\[observed\]\] number 1: bands: .*contains no frequency line"),
 ]
 
 
@@ -138,7 +138,7 @@ BOLTED_CHANGES = [
     (
         "k_theta_y = [[200.0, 500.0]]",
         "k_theta_y = [[601.0, 700.0]]",
-        r"\[bands\]: k_theta_y: .*holds no frequency line",
+        r"\[bands\]: k_theta_y: .*contains no frequency line",
     ),
     ("block = 1", "block = 4", r"\[\[noise\]\] number 1: block must be a divisor of 6"),
     ('"compliance"]', '"decoupling-ss"]', r"\[\[noise\]\] number 1: methods must be a list of ismm, compliance"),

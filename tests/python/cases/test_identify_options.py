@@ -60,7 +60,7 @@ OPTIONS = {
     "noise": ("--noise", "0.002"),
     "setup-gain": ("--setup-gain", "0.01"),
     "common-gain": ("--common-gain", "0.01"),
-    "accept-bent": ("--accept-bent",),
+    "accept": ("--accept", "quantity"),
     "window-decay": ("--window-decay", "2"),
     "no-window": ("--window-decay", "0"),
     "negative-window": ("--window-decay", "-2"),

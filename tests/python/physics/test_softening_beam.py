@@ -75,7 +75,7 @@ def test_no_search_leaves_the_range_in_which_there_is_a_model(beam, force):
     freq, h, k = measured(beam, force, 1e-3, 1)
     with warnings.catch_warnings(record=True) as issued:
         warnings.simplefilter("always")
-        fit = jf.identify_model(freq, h, nominal(), ["A/1:y"], ["A/1:y"], accept_bent=True)
+        fit = jf.identify_model(freq, h, nominal(), ["A/1:y"], ["A/1:y"])
         limits = fit.confidence_interval()
         eta = fit.loss_factors["eta_theta_z"]
     assert {one.category.__name__ for one in issued} <= {"IdentificationWarning", "ConvergenceWarning"}
@@ -98,7 +98,7 @@ def test_eight_levels_by_identify_and_levels(beam, tmp_path, capsys):
         files.append(str(tmp_path / f"level_{i + 1}.npz"))
         write_frfs(files[-1], FrfSet(freq, (Channel(11, "+y"),), (Channel(11, "+y"),), h))
     model = ["--model", str(tmp_path / "assembly.toml")]
-    assert main(["identify", *files, *model, "--each", "--accept-bent"]) == 0
+    assert main(["identify", *files, *model, "--each"]) == 0
     shown = capsys.readouterr()
     assert all(f"level_{i + 1}" in shown.out for i in range(8))
     assert "encountered" not in shown.err

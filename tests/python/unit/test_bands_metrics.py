@@ -20,7 +20,7 @@ def test_band_mean_takes_each_dof_in_its_own_bands():
 @pytest.mark.parametrize(
     ("bands", "message"),
     [
-        ((20, 30), "the band 20 to 30 Hz holds no frequency line; they run from 1 to 10 Hz"),
+        ((20, 30), "the band 20 to 30 Hz contains no frequency line; they run from 1 to 10 Hz"),
         ((3, 2), r"a band must be \(low, high\)"),
         ((1, 2, 3), r"a band must be \(low, high\)"),
         ({"y": (1, 2)}, "has no band for DOF 'theta'"),
@@ -33,7 +33,7 @@ def test_bad_bands_get_one_sentence(bands, message):
 
 
 def test_no_damping_from_a_line_at_rest():
-    with pytest.raises(ValueError, match="the band of 0 holds 0 Hz"):
+    with pytest.raises(ValueError, match="the band of 0 contains 0 Hz"):
         jf.band_mean([0.0, 1.0], np.zeros((2, 1, 1)))
 
 

@@ -56,7 +56,7 @@ def floor(h, level, seed=1):
 #: What is measured of `beams`: from exact FRFs h, those with 1 % noise x, and the frequencies f; and what is said.
 NOTHING = {
     "no lines": (lambda s, h, x: (s.freq[:0], x[:0]), {}, "gamma has no frequency lines"),
-    "a band without lines": (lambda s, h, x: (s.freq, x), {"bands": (2e3, 3e3)}, "holds no frequency line"),
+    "a band without lines": (lambda s, h, x: (s.freq, x), {"bands": (2e3, 3e3)}, "contains no frequency line"),
     "a line of NaN": (lambda s, h, x: (s.freq, put(x, np.nan, 0, 1)), {}, "gamma: NaN or Inf in line 0"),
     "zeros": (lambda s, h, x: (s.freq, 0 * x), {}, "the responses j:y, j:theta, k:y, k:theta are zero"),
     "a dead response": (lambda s, h, x: (s.freq, put(x, 0, 1)), {}, "the responses j:theta are zero"),

@@ -225,7 +225,7 @@ def test_only_lines_in_the_bands_are_used(beams):
         (dict(dofs=["y", "y"]), "dofs must name 2 different joint DOFs"),
         (dict(dofs=["y", ""]), "dofs must name 2 different joint DOFs"),
         (dict(dofs=["y", "x,z"]), "without commas"),
-        (dict(bands=(2000, 3000)), "holds no frequency line"),
+        (dict(bands=(2000, 3000)), "contains no frequency line"),
         (dict(damping="friction"), "damping must be one of"),
         (dict(cross="all"), "cross must be one of"),
         (dict(noise=-1.0), "noise must be positive"),

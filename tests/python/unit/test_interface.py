@@ -61,7 +61,7 @@ LINE = {1: (0, 0, 0), 2: (0, 0, 0.02), 3: (0, 0, 0), 4: (0, 0, 0.02), 5: (0.01, 
         (([1, 9], [3, 4], ["y"], LINE), "node 9 has no coordinates"),
         (([1, 2, 5], [3, 4], ["y"], LINE), "do not lie on one line"),
         (([1], [3], ["theta_x"], LINE), "theta_x needs at least two nodes"),
-        (([1, 2], [3, 4], ["theta_z"], LINE), "they lie along its axis z"),
+        (([1, 2], [3, 4], ["theta_z"], LINE), "along its axis z; name nodes off that axis"),
     ],
 )
 def test_what_cannot_be_built_is_said(arguments, message):

@@ -94,9 +94,9 @@ def test_what_is_wrong_is_said():
     with pytest.raises(ValueError, match="is listed twice as response"):
         jf.joint_channels(frfs, [*places, places[0]], POINT)
     bare = replace(frfs, coordinates={})
-    with pytest.raises(ValueError, match=r"^node 101 has no coordinates, neither in "):
+    with pytest.raises(ValueError, match=r"^node 101 has no coordinates in "):
         jf.joint_channels(bare, places, POINT)
-    with pytest.raises(ValueError, match=r"^channels\.csv, line 2: node 101 has no coordinates, neither in "):
+    with pytest.raises(ValueError, match=r"^channels\.csv, line 2: node 101 has no coordinates in "):
         jf.joint_channels(bare, [replace(place, where="channels.csv, line 2") for place in places], POINT)
     few = [place for place in places if place.channel.node not in (101, 102, 103)]
     with pytest.raises(ValueError, match=r"responses of side j .*too few for 6 DOFs"):

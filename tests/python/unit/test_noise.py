@@ -172,5 +172,5 @@ def test_bad_arguments_get_one_sentence(change, message):
 
 
 def test_more_realisations_than_memory_are_refused(random_lines):
-    with pytest.raises(MemoryError, match=r"count: 1000000000 realisations of h take .* GiB: draw them in parts"):
+    with pytest.raises(MemoryError, match=r"count: 1000000000 realisations of h take .* GiB; draw them in parts"):
         jf.realisations(random_lines(200, 4), 0.05, seed=1, count=10**9)

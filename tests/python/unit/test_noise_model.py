@@ -291,7 +291,7 @@ def test_independent_lines_are_not_outlying_and_not_correlated():
 
 
 def test_bad_arguments(h):
-    with pytest.raises(ValueError, match="averages are used with coherence only"):
+    with pytest.raises(ValueError, match="averages need coherence"):
         jf.estimate_noise(FREQ, h, averages=3)
     with pytest.raises(ValueError, match="coherence must be above 0 and at most 1"):
         jf.estimate_noise(FREQ, h, coherence=np.full(h.shape, 1.1))

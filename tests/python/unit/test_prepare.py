@@ -129,7 +129,7 @@ def test_frfs_made_reciprocal_are_told_from_measured_ones(beams):
             NoiseOptions(0.01, coherence=np.ones((158, 4, 4))),
             "coherence and averages are used where noise is not given",
         ),
-        (NoiseOptions(averages=4), "averages are used with coherence only"),
+        (NoiseOptions(averages=4), "averages need coherence"),
         (NoiseOptions(coherence=np.full((158, 4, 4), 1.1)), "coherence must be above 0 and at most 1"),
         (NoiseOptions(coherence=np.ones((10, 4, 4))), "coherence must have shape"),
     ],

@@ -92,7 +92,7 @@ def test_too_many_missing_frfs_are_an_error():
 
 @pytest.mark.parametrize(
     ("argument", "error"),
-    [({"names": ["a"]}, "joint goes without names"), ({"read_as": "force"}, "read_as")],
+    [({"names": ["a"]}, "joint has its own channels; leave out names"), ({"read_as": "force"}, "read_as")],
 )
 def test_wrong_arguments(argument, error):
     test = simulated_test(0)

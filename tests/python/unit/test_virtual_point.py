@@ -129,7 +129,7 @@ SLANTED = [[-0.01, -0.01, 0.0], [0, 0, 0], [0.01, 0.01, 0]]
 @pytest.mark.parametrize(
     ("positions", "directions", "more", "message"),
     [
-        (LINE, np.eye(3), {}, "3 channels with weight: too few for 6 DOFs"),
+        (LINE, np.eye(3), {}, "3 channels with weight are too few for 6 DOFs"),
         (LINE, np.eye(3), {"weights": [1, 0, 1], "dofs": ["x", "y", "z"]}, "2 channels with weight"),
         (*triaxial(LINE), {}, "the channels do not show theta_z$"),
         (*triaxial(SLANTED), {}, "the channels cannot distinguish theta_x, theta_y$"),
@@ -174,7 +174,7 @@ def test_channels_by_name():
     np.testing.assert_array_equal(positions, [[0.1, 0, 0], [0, 0, 0.01]])
     np.testing.assert_array_equal(directions, [[0, 0, -1], [0, 1, 0]])
     assert channel_geometry([], {})[0].shape == (0, 3)
-    with pytest.raises(ValueError, match="node 2 has none"):
+    with pytest.raises(ValueError, match="node 2 has no coordinates; add them"):
         channel_geometry(["2:x"], coordinates)
     with pytest.raises(ValueError, match=r"1:\+rx is a rotation"):
         channel_geometry(["1:rx"], coordinates)

@@ -172,13 +172,13 @@ def as_channel_names(
     words = ("responses", "forces")
     if names is not None:
         if responses is not None or forces is not None:
-            raise ValueError("names goes without responses and forces")
+            raise ValueError("names are of responses and forces alike; give names, or responses and forces")
         responses = forces = names
         words = ("names", "names")
     elif (responses is None) != (forces is None):
-        raise ValueError("responses and forces go together")
+        raise ValueError("responses or forces are missing; give both")
     elif responses is None and shape[0] != shape[1]:
-        raise ValueError(f"h holds {shape[0]} responses and {shape[1]} forces: name them by responses and forces")
+        raise ValueError(f"h has {shape[0]} responses and {shape[1]} forces; name them with responses= and forces=")
     found = []
     for word, own, n in zip(words, (responses, forces), shape, strict=True):
         if own is not None and (isinstance(own, str) or not isinstance(own, Iterable)):
