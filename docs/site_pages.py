@@ -11,6 +11,7 @@ import jointfrf as jf
 _ROOMS = {
     "identification": "From FRFs to a joint",
     "channels": "From channels to joint DOFs, and what is wrong with them",
+    "messages": "Findings",
     "frf": "FRFs, noise, bands",
     "assembly_file": "Assemblies in files",
     "substructuring": "Coupling and decoupling",
@@ -50,6 +51,7 @@ _SECTIONS = {
         "docs/generated/api/index.md",
         "docs/generated/fortran.md",
         "docs/command-line.md",
+        "docs/messages.md",
         "docs/files.md",
         "docs/assembly-keys.md",
         "docs/case-keys.md",

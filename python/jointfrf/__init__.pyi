@@ -9,7 +9,7 @@ from jointfrf.amplitude.lines import Drive
 from jointfrf.assembly_file.measured import MeasuredAssembly, measured_assembly
 from jointfrf.assembly_file.read import AssemblyPart, read_part
 from jointfrf.channels.check.check import check_frfs
-from jointfrf.channels.check.finding import FrfCheck, FrfFinding
+from jointfrf.channels.check.result import FrfCheck
 from jointfrf.channels.joint_channels import ChannelAgreement, JointChannels, SideAgreement, joint_channels
 from jointfrf.channels.point_lines import (
     DifferenceError,
@@ -54,7 +54,6 @@ from jointfrf.frf.smoothing import SmoothFrfs, smooth_frfs
 from jointfrf.identification.band_means import identify_band_mean
 from jointfrf.identification.derived import Derived
 from jointfrf.identification.elastic_centre import ElasticCentre, elastic_centre
-from jointfrf.identification.findings import Finding
 from jointfrf.identification.fit_cards import cards
 from jointfrf.identification.identify import identify
 from jointfrf.identification.identify_model import identify_model
@@ -76,6 +75,7 @@ from jointfrf.laws.law import JointLaw, LawField
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
 from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinearSolid
+from jointfrf.messages.finding import Finding
 from jointfrf.models.beam import beam
 from jointfrf.models.matrices import from_triangle
 from jointfrf.models.model import Model, assemble, chain
@@ -163,7 +163,6 @@ __all__ = [
     "FreeBody",
     "FrfCheck",
     "FrfCheckWarning",
-    "FrfFinding",
     "FunctionLaw",
     "GroundSpring",
     "Hole",

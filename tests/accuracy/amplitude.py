@@ -131,7 +131,7 @@ def bent(freq: np.ndarray, h: np.ndarray, noise: float, seed: int, of_force: flo
     own = own * (1 + size[0] + 1j * size[1])
     columns = range(h.shape[2])
     found = jf.check_frfs(freq, own, responses=[str(i) for i in range(h.shape[1])], forces=[str(i) for i in columns])
-    return any(one.kind == "bent" for one in found.findings)
+    return any(one.code == "amplitude-dependent" for one in found.findings)
 
 
 def checks(draws: int) -> Iterator[str]:

@@ -191,7 +191,7 @@ def one_draw(trial: CalibrationTrial, place: int, number: int) -> Draw | None:
             # No joint was found, and that is said.
             return None
         interval = fit.confidence_interval(0.95)
-    kinds = tuple(one.kind for one in fit.findings if one.severity == "warning")
+    kinds = tuple(one.code for one in fit.findings if one.severity == "warning")
     return Draw(fit.value, interval, bool(fit.residual_is_noise), kinds, time.process_time() - start)
 
 
@@ -226,7 +226,7 @@ def row(trial: CalibrationTrial, all_draws: Sequence[Draw | None]) -> str:
         widths.append(float(np.median(high - low)) / 2 / rmse)
     shown = " / ".join(f"{error:.2g}" for error in errors)
     seconds = float(np.median([draw.seconds for draw in draws]))
-    alarms, warned = sum(not draw.is_noise for draw in draws), sum("residual" in draw.kinds for draw in draws)
+    alarms, warned = sum(not draw.is_noise for draw in draws), sum("residual-large" in draw.kinds for draw in draws)
     return (
         f"| {trial.name} | {len(all_draws)} | {shown} | {max(ratios):.2f} | "
         f"{min(coverage):.0f} .. {max(coverage):.0f}, {np.mean(coverage):.1f} | {np.median(widths):.1f} | {alarms} | "

@@ -118,7 +118,8 @@ def one_draw(pair: Pair, model_error: float | None, seed: int, *, exact: bool = 
         fit = jf.identify_model(FREQ, h, pair.believed(model_error, exact=exact), channels, channels)
         low, high = np.array([fit.intervals.of(name, 0.95) for name in TRUE]).T
     true = np.array(list(TRUE.values()))
-    said = any(one.severity == "warning" and one.kind in ("residual", "model", "prior") for one in fit.findings)
+    codes = {one.code for one in fit.findings if one.severity == "warning"}
+    said = not codes.isdisjoint(("residual-large", "model-error", "prior-contradicted"))
     return (low <= true) & (true <= high), (high - low) / (2 * true), said
 
 

@@ -12,7 +12,6 @@ from scipy.special import ndtri
 from jointfrf.amplitude.amplitude_laws import AMPLITUDE_LAWS
 from jointfrf.amplitude.levels import JointLevel, JointLevels, check_laws, of_levels
 from jointfrf.identification.derived import Derived
-from jointfrf.identification.findings import Finding, note, warn
 from jointfrf.identification.model.assembly import Assembly
 from jointfrf.identification.model.substructure import FrfSource, Substructure, Unknown
 from jointfrf.kernel.arguments import (
@@ -25,6 +24,7 @@ from jointfrf.kernel.arguments import (
 )
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
+from jointfrf.messages.finding import Finding
 from jointfrf.spelling import did_you_mean
 
 __all__ = ["Backbone", "backbone_levels"]
@@ -165,13 +165,10 @@ def backbone_levels(
     found = [_level(one, label, share) for one, label in zip(points, backbone.labels, strict=True)]
     loose = [name for name, std, _ in _unknowns(whole) if std is None]
     if loose:
-        text = f"{', '.join(loose)}: unknown without a standard deviation, taken as believed"
-        findings.append(note("prior", text, tuple(loose)))
+        findings.append(Finding("unknown-fixed", about=tuple(loose)))
     wrong = [one.label for one in found if one.stiffness.value <= 0 or one.loss_factor.value <= 0]
     if wrong:
-        text = (f"{own}: stiffness or damping of {', '.join(wrong)} is not positive: the models do not have this mode "
-                "at this frequency, or lose more energy than it does")  # fmt: skip
-        findings.append(warn("model", text, (own,)))
+        findings.append(Finding("mode-not-in-models", {"levels": tuple(wrong)}, (own,)))
     around = whole.joint if isinstance(whole.joint, LawJoint) else None
     return of_levels({own: found}, {}, findings, chosen, share, dict.fromkeys(backbone.labels, around))
 

@@ -12,11 +12,11 @@ from jointfrf.amplitude.amplitude_laws import AMPLITUDE_LAWS, AmplitudeLawFits, 
 from jointfrf.amplitude.lines import Bend, DofLines, Drive, lines_of_fit, with_amplitude
 from jointfrf.dofs import is_rotation
 from jointfrf.identification.derived import Derived
-from jointfrf.identification.findings import Finding, note, warn, worst_first
 from jointfrf.identification.result import Fit, columns_of
 from jointfrf.kernel.arguments import as_names, as_probability, check_choice
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
+from jointfrf.messages.finding import Finding, WithFindings, worst_first
 
 __all__ = ["JointLevel", "JointLevels", "check_laws", "levels", "of_levels"]
 
@@ -27,11 +27,6 @@ _CHANGES, _BENT = 0.05, 1e-4
 _MOST = 3
 #: Amplitudes of the fit that differ from those of the one before by less than this, e-fold, are found.
 _SETTLED, _ROUNDS = 0.02, 4
-#: What can be done about bent FRFs.
-_CURE = (
-    "measure with the motion held (response control) or at a lower level, leave out the lines where the amplitude "
-    "changes most, or use the backbone of a mode"
-)
 
 
 @dataclass(frozen=True)
@@ -67,7 +62,7 @@ class JointLevel:
 
 
 @dataclass(frozen=True)
-class JointLevels:
+class JointLevels(WithFindings):
     """A joint over amplitude; `print` shows it, `write_levels` makes a page.
 
     Attributes
@@ -94,11 +89,6 @@ class JointLevels:
     probability: float = 0.95
     joints: dict[str, LawJoint] = field(default_factory=dict)
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What a reader must know before using the numbers."""
-        return tuple(one.text for one in self.findings if one.severity == "warning")
-
     def __str__(self) -> str:
         """Return a table of each DOF, that of its laws, and the findings."""
         parts = []
@@ -106,7 +96,7 @@ class JointLevels:
             parts.append("\n".join(columns_of(level_rows(dof, own, self.probability))))
             if dof in self.laws:
                 parts.append(str(self.laws[dof]))
-        said = [f"{'warning' if one.severity == 'warning' else 'note'}: {one.text}" for one in self.findings]
+        said = [str(one) for one in self.findings]
         return "\n\n".join([*parts, "\n".join(said)] if said else parts)
 
 
@@ -199,17 +189,16 @@ def levels(
             raise ValueError(f"{label}: {error}") from error
         if not one.lines:
             raise ValueError(f"{label}: no DOF of the joint is a spring whose stiffness was found")
-        if one.bent:
-            refused[label] = "; ".join(one.bent.values())
-            text = f"{label}: FRFs bent by amplitude, left out: {refused[label]}; {_CURE}"
-            findings.append(warn("bent", text, tuple(one.bent)))
+        if one.rejected:
+            refused[label] = "; ".join(each.text for each in one.rejected)
+            findings += [replace(each, test=label) for each in one.rejected]
             continue
         findings += _of_fit(one, label)
         around[label] = one.fit.laws
         for dof in one.lines:
             found.setdefault(dof, []).append(_level(one, dof, label, share))
     if not found:
-        raise ValueError(f"every test is bent by amplitude: {next(iter(refused.values()))}; {_CURE}")
+        raise ValueError(f"every test is amplitude-dependent: {next(iter(refused.values()))}")
     return of_levels(found, refused, findings, chosen, share, around)
 
 
@@ -240,15 +229,14 @@ def of_levels(
         try:
             of_laws |= {dof: _laws(usable, laws, share)} if laws and usable else {}
         except ValueError as error:
-            findings.append(note("left out", f"{dof}: no law is fitted: {error}", (dof,)))
+            findings.append(Finding("law-not-fitted", {"reason": str(error)}, (dof,)))
         if dof in of_laws and (best := of_laws[dof].fits[0]).widened > 1:
-            text = (
-                f"{dof}: no law explains the levels: chi^2 of the best, {best.law}, is {best.chi_square:.3g} with "
-                f"{best.degrees} degrees of freedom; intervals of its parameters are {best.widened:.2g} times as wide"
-            )
-            findings.append(warn("residual", text, (dof,)))
+            numbers = {
+                "law": best.law, "chi_square": best.chi_square, "degrees": best.degrees, "widened": best.widened
+            }  # fmt: skip
+            findings.append(Finding("law-misfit", numbers, (dof,)))
         if why:
-            findings.append(note("left out", f"{dof}: no laws are fitted to {why}", (dof,)))
+            findings.append(Finding("law-not-fitted", {"reason": why}, (dof,)))
     joints = {label: joint for label, one in around.items() if (joint := _secant(found, label, one)) is not None}
     return JointLevels(ordered, of_laws, refused, worst_first(findings), share, joints)
 
@@ -277,12 +265,12 @@ def _labels(fits: Sequence[Fit], drives: Sequence[Drive], labels: Sequence[str] 
 
 
 class _Followed(NamedTuple):
-    """A fit whose K* follows the amplitude: its lines, orders in ln a, and what is left, by DOF."""
+    """A fit whose K* follows the amplitude: its lines and orders in ln a by DOF, and DOFs whose K* does not follow."""
 
     fit: Fit
     lines: dict[str, DofLines]
     orders: dict[str, int]
-    bent: dict[str, str]
+    rejected: list[Finding]
 
 
 def _followed(fit: Fit, drive: Drive) -> _Followed:
@@ -298,9 +286,9 @@ def _followed(fit: Fit, drive: Drive) -> _Followed:
             if changed is None:
                 break
             (fit, lines), orders = changed, more
-    bent = {dof: _words(dof, own, bend) for dof, own in lines.items()
-            if (bend := own.bend(orders[dof] + 1)).p_value < _BENT}  # fmt: skip
-    return _Followed(fit, lines, orders, bent)
+    rejected = [_not_smooth(dof, own, bend) for dof, own in lines.items()
+                if (bend := own.bend(orders[dof] + 1)).p_value < _BENT]  # fmt: skip
+    return _Followed(fit, lines, orders, rejected)
 
 
 def _refitted(
@@ -324,18 +312,13 @@ def _refitted(
 def _of_fit(one: _Followed, label: str) -> list[Finding]:
     """Return what is in doubt of a fit, but for how K* goes with amplitude, which is followed and no result."""
     own = {each.name for each in one.fit.parameters if each.origin == "joint" and each.kind not in ("k", "h", "c", "m")}
-    said = [each for each in one.fit.findings
-            if each.severity == "warning" and each.kind != "bent" and not own & set(each.about)]  # fmt: skip
-    return [replace(each, text=f"{label}: {each.text}") for each in said]
+    found = (each for each in one.fit.findings if each.severity != "note" and each.code != "amplitude-dependent")
+    return [replace(each, test=label) for each in found if not own & set(each.about)]
 
 
-def _words(dof: str, own: DofLines, bend: Bend) -> str:
-    """Say how much K* of a test goes with amplitude."""
+def _not_smooth(dof: str, own: DofLines, bend: Bend) -> Finding:
     low, high = own.range()
-    return (
-        f"K* of {dof} is not what a smooth function of ln a makes of it while the amplitude goes from {low:.2g} to "
-        f"{high:.2g} over the lines (chance {bend.p_value:.1g})"
-    )
+    return Finding("amplitude-not-smooth", {"low": low, "high": high, "chance": bend.p_value}, (dof,))
 
 
 def _level(one: _Followed, dof: str, label: str, share: float) -> JointLevel:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from jointfrf.channels.check.check import check_frfs
-from jointfrf.channels.check.finding import FrfCheck
+from jointfrf.channels.check.result import FrfCheck
 from jointfrf.cli.measured_file import add_file_arguments, file_names, in_some_band, read_measured
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
 from jointfrf.cli.parser import CommandParser
@@ -57,8 +57,8 @@ def run(args: argparse.Namespace) -> int:
         names = frfs.responses, frfs.excitations
         check, warned = check_frfs(*lines, responses=names[0], forces=names[1], read_as=measured.quantity), []
     out.say(f"{file_names(args)}: {check}")
-    out.warn(*check.serious)
+    out.warn(*check.warnings)
     about = {} if joint is None else {"joint": joint.to_dict()}
     content = {"sources": [str(path) for path in args.files], "quantity": frfs.stated, **check.to_dict(), **about}
-    out.give(content | {"warnings": [*warned, *check.serious]})
+    out.give(content | {"warnings": [*warned, *check.warnings]})
     return 0 if check.ok and not warned else 1

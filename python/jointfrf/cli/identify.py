@@ -11,9 +11,9 @@ from typing import Any, get_args
 import numpy as np
 
 from jointfrf.assembly_file.side_part import SidePart, read_side
-from jointfrf.channels.check.bent import refuse_bent
+from jointfrf.channels.check.amplitude import refuse_amplitude
 from jointfrf.channels.check.check import warn_of_frfs
-from jointfrf.channels.check.finding import FrfCheck
+from jointfrf.channels.check.result import FrfCheck
 from jointfrf.channels.point_lines import difference_error
 from jointfrf.cli.check import check_joint
 from jointfrf.cli.export import CardRequest, add_card_arguments, card_request, page_nodes, parse_export, written_cards
@@ -155,7 +155,7 @@ def run(args: argparse.Namespace) -> int:
     request = card_request(args, joint.dofs, damping=damping, cross=args.cross, points=points)
     check = check_joint(joint, measured.quantity)
     if not args.accept_bent:
-        refuse_bent(check.findings)
+        refuse_amplitude(check.findings)
     _warn(args, joint, check)
     out.say(*_heading(args, frfs, joint), *(line for side in sides for line in side.text))
     fits = []
@@ -254,7 +254,7 @@ def _content(
         "sources": [str(path) for path in args.files],
         "joint": joint.to_dict(),
         "checks": check.to_dict(),
-        "warnings": [*joint.warnings(check), *check.serious, *(text for fit in fits for text in fit.warnings)],
+        "warnings": [*joint.warnings(check), *check.warnings, *(text for fit in fits for text in fit.warnings)],
         "fits": [fit_to_dict(fit, lines=False) for fit in fits],
         "cards": text or None,
         "written": [str(path) for path in written],

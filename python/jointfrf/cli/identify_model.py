@@ -26,6 +26,7 @@ from jointfrf.identification.record import fit_to_dict, write_record
 from jointfrf.identification.result import Fit, columns_of
 from jointfrf.io.units import model_units
 from jointfrf.kernel.arguments import FloatArray
+from jointfrf.messages.finding import messages_of
 from jointfrf.report.fit_model import next_sentences
 from jointfrf.report.fit_page import write_report
 
@@ -88,7 +89,7 @@ def run_model(args: argparse.Namespace) -> int:
         written += paths
         contents.append(content)
     if args.each and fits:
-        found = [f"{stem}: {text}" for stem, fit in fits.items() for text in fit.warnings]
+        found = [text for stem, fit in fits.items() for text in messages_of(fit.findings, stem)]
         out.say(*_table(fits), *(f"warning: {text}" for text in found))
         out.warn(*found)
         if args.out is not None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from jointfrf.assembly_file.side_part import PlacedChannel
-from jointfrf.channels.check.finding import FrfCheck
+from jointfrf.channels.check.result import FrfCheck
 from jointfrf.channels.joint_channels import (
     JointChannels,
     LeftOutDof,
@@ -132,7 +132,7 @@ class MeasuredJoint:
 
     def _without(self, check: FrfCheck) -> MeasuredJoint:
         """Return the same without the channels in which errors were found; itself where the others do not suffice."""
-        wrong = {name for finding in check.findings if finding.level == "error" for name in finding.channels}
+        wrong = {name for finding in check.findings if finding.severity == "error" for name in finding.about}
         if self.channels is None or not wrong:
             return self
         sides = self.responses.channels, self.forces.channels
@@ -155,7 +155,7 @@ class MeasuredJoint:
 
     def warnings(self, check: FrfCheck) -> Iterator[str]:
         """Say what a reader must know before the fit, beside what a look at the FRFs has found."""
-        if any(finding.kind == "reference" and finding.level == "error" for finding in check.findings):
+        if any(finding.code == "coordinates-unit" and finding.severity == "error" for finding in check.findings):
             return
         yield from (str(one) for one in self._without(check).left_out)
         yield from (f"{one}; --at X,Y,Z gives both sides one" for one in self.offsets if one.is_left_out)

@@ -11,15 +11,13 @@ from numpy.typing import ArrayLike
 from jointfrf.channels.point_lines import Interface
 from jointfrf.dofs import joint_parameters
 from jointfrf.frf.bands import Band, as_bands, band_mean, in_bands
-from jointfrf.identification.findings import note
 from jointfrf.identification.prepare import BandsOfDofs, as_dof_names, as_measured, as_transform
 from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_choice
+from jointfrf.messages.finding import Finding
 from jointfrf.substructuring.methods import STIFFNESS_METHODS, JointFrfs, StiffnessMethod, joint_stiffness
 
 __all__ = ["identify_band_mean"]
-
-_NOTE = "the standard error of a band mean is the scatter of its lines; its bias by noise is not included"
 
 
 def identify_band_mean(
@@ -116,7 +114,7 @@ def identify_band_mean(
     kept = np.any([in_bands(freq, bands) for bands in of_dofs], axis=0)
     return Fit.of_springs(
         method, names, values, covariance, np.nan, np.nan, freq[kept],
-        findings=(note("averages", _NOTE),), k_lines=k_lines[kept], bands=of_dofs,
+        findings=(Finding("band-mean-error"),), k_lines=k_lines[kept], bands=of_dofs,
     )  # fmt: skip
 
 

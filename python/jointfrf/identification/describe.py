@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,6 @@ from scipy.special import ndtr, ndtri
 from jointfrf.dofs import Parameter, compliance_unit, parameters_shared
 from jointfrf.frf.calibration import CalibrationErrors, SetUpErrors
 from jointfrf.identification.elastic_centre import elastic_centre
-from jointfrf.identification.findings import Finding, note, warn
 from jointfrf.identification.fit_data import ModelData
 from jointfrf.identification.joint_alone import with_joint_alone
 from jointfrf.identification.manifold.coordinates import CrossTerms
@@ -31,6 +29,8 @@ from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.identification.result import Fit, FittedParameter, law_parameters
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.laws.law_joint import LawJoint
+from jointfrf.messages.finding import Finding
+from jointfrf.messages.message import Severity
 
 __all__ = ["describe_laws", "describe_model", "describe_springs", "poor_laws"]
 
@@ -52,9 +52,9 @@ _FLEXIBLE = 0.05
 _NEARLY_OPEN = 4.0
 #: What the width of an interval is due to, and what would make it smaller.
 _CURES = (
-    ("sides", "models of the sides (--side-j, --side-k; sides=), or channels nearer to the joint"),
-    ("inertia", "models of the sides (--side-j, --side-k; sides=), or lines at lower frequencies"),
-    ("noise", "less noise: more averages, more hits, more lines"),
+    ("sides", "give models of the sides (--side-j, --side-k; sides=), or measure nearer to the joint"),
+    ("inertia", "give models of the sides (--side-j, --side-k; sides=), or measure at lower frequencies"),
+    ("noise", "take more averages, hits or lines"),
 )
 #: A reference point is proposed where it lowers the largest coupling to this share.
 _LESS = 0.5
@@ -78,15 +78,6 @@ _UNCHANGED = 0.9
 _CLEAR_GAIN = 5.0
 #: Another minimum whose -2 log likelihood is higher by less than this is named: odds of 1 to 150.
 _OTHER = 10.0
-_PER_PART = (
-    ", or the noise was said for real and imaginary parts each: its level is sqrt(E|e|^2) of both together, 1.41 times "
-    "that"
-)
-_MEAN_OF_TWO = ", or h_pq and h_qp were replaced by their mean, whose noise is smaller"
-_COUPLED = (
-    "; with cross terms it does: the DOFs of the joint are coupled, so ignore or fit the cross terms (cross), or move "
-    "the reference point"
-)
 
 
 # ---------------------------------------------------------------- springs and dampers, FRFs between all joint DOFs
@@ -137,7 +128,7 @@ def describe_springs(found: ManifoldFit, problem: FitProblem) -> Fit:
     ]
     if not result.converged:
         most = max(group.iterations for group in result.groups)
-        findings.append(warn("convergence", f"the fit did not converge in {most} iterations"))
+        findings.append(Finding("not-converged", {"iterations": most}, variant="iterations"))
     return fit.with_findings(findings)
 
 
@@ -161,7 +152,7 @@ def _at_all_points(
 
 def _equal_points(same: Sequence[Sequence[str]]) -> list[Finding]:
     """Say which points share their parameters."""
-    return [note("same", f"{', '.join(own)}: equal joints, which share their parameters", tuple(own)) for own in same]
+    return [Finding("equal-points", about=tuple(own)) for own in same]
 
 
 def _poor_springs(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[Finding]:
@@ -171,35 +162,34 @@ def _poor_springs(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[F
         low, high = intervals[one.name]
         if one.kind != "k" or one.is_cross:
             continue
-        value, about = fit.value[one.name], (one.name,)
         if not np.isfinite(high):
-            bound = (
-                f"at least {low:.3g} {one.unit} (95 %), best estimate {value:.2g}"
-                if low > 0
-                else "the data give no bound"
-            )
-            found.append(warn("open", f"{one}: this DOF cannot be distinguished from a rigid one; {bound}", about))
+            found.append(_unbounded(one, low, fit.value[one.name]))
         elif not low > 0:
-            bound = f"at most {high:.3g} {one.unit} (95 %)"
-            found.append(warn("open", f"{one}: not significantly different from zero, a free DOF; {bound}", about))
-        elif high - low > 2 * _UNCERTAIN * abs(value):
+            found.append(_maybe_zero(one, high))
+        elif high - low > 2 * _UNCERTAIN * abs(fit.value[one.name]):
             found.append(_poor(one, low, high))
     return found
 
 
+def _unbounded(one: FittedParameter, low: float, value: float) -> Finding:
+    numbers = {"parameter": str(one), "low": low, "unit": one.unit, "value": value}
+    return Finding("stiffness-unbounded", numbers, (one.name,), variant="" if low > 0 else "no-bound")
+
+
+def _maybe_zero(one: FittedParameter, high: float) -> Finding:
+    return Finding("stiffness-zero", {"parameter": str(one), "high": high, "unit": one.unit}, (one.name,))
+
+
 def _poor(one: FittedParameter, low: float, high: float) -> Finding:
-    limits = f"95 % interval {low:.3g} .. {high:.3g} {one.unit}"
-    return warn("poor", f"{one}: poorly determined by the data, {limits}", (one.name,))
+    numbers = {"parameter": str(one), "low": low, "high": high, "unit": one.unit}
+    return Finding("poorly-determined", numbers, (one.name,))
 
 
 def _negative_damping(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[Finding]:
     """Name damping that is significantly negative: a joint supplies no energy."""
     return [
-        warn(
-            "sign",
-            f"{one}: significantly negative, {fit.value[one.name]:.3g} {one.unit}; a joint supplies no energy: check "
-            "the sign of phases (time convention), delays between channels, and the damping terms asked for",
-            (one.name,),
+        Finding(
+            "damping-negative", {"parameter": str(one), "value": fit.value[one.name], "unit": one.unit}, (one.name,)
         )
         for one in fit.parameters
         if one.kind != "k" and not one.is_cross and intervals[one.name][1] < 0
@@ -211,8 +201,7 @@ def _insignificant(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[
     names = tuple(
         one.name for one in fit.parameters if one.kind != "k" and intervals[one.name][0] < 0 < intervals[one.name][1]
     )
-    text = f"{', '.join(names)}: not significantly different from zero (95 % interval)"
-    return [note("sign", text, names)] if names else []
+    return [Finding("damping-insignificant", about=names)] if names else []
 
 
 def _groups(groups: Sequence[NDArray[np.intp]], dofs: tuple[str, ...], cross: CrossTerms) -> list[Finding]:
@@ -220,9 +209,7 @@ def _groups(groups: Sequence[NDArray[np.intp]], dofs: tuple[str, ...], cross: Cr
     if len(groups) < 2:
         return []
     names = " and ".join(f"({_named(group, dofs)})" for group in groups)
-    text = f"the FRFs between {names} are zero: each group is fitted separately"
-    text += ", and cross terms between them cannot be identified" if cross == "fit" else ""
-    return [note("groups", text, dofs)]
+    return [Finding("separate-groups", {"groups": names}, dofs, variant="cross" if cross == "fit" else "")]
 
 
 def _named(group: NDArray[np.intp], dofs: tuple[str, ...]) -> str:
@@ -237,18 +224,11 @@ def _choices(choices: Sequence[DofDamping]) -> list[Finding]:
             kinds = [one.best, *(kind for kind, _ in one.others)]
             shares = [1 - sum(share for _, share in one.others), *(share for _, share in one.others)]
             odds = ", ".join(f"{kind} {100 * share:.2g} %" for kind, share in zip(kinds, shares, strict=True))
-            text = (
-                f"damping of {one.dof}: the data do not decide its terms ({odds}); values are means over these, and "
-                "intervals hold those of all"
-            )
-            found.append(note("choice", text, (one.dof,)))
+            found.append(Finding("damping-averaged", {"dof": one.dof, "odds": odds}, (one.dof,)))
             continue
         strength = "clearly" if one.margin > 10 else "weakly" if one.margin > 2 else "hardly"
-        text = (
-            f"damping of {one.dof}: {one.best}, {strength} preferred to {one.second} "
-            f"(difference of BIC {one.margin:.1f})"
-        )
-        found.append(note("choice", text, (one.dof,)))
+        numbers = {"dof": one.dof, "best": one.best, "strength": strength, "second": one.second, "margin": one.margin}
+        found.append(Finding("damping-chosen", numbers, (one.dof,)))
     return found
 
 
@@ -266,45 +246,29 @@ def _reference_point(fit: Fit) -> list[Finding]:
         for axis, r, error in zip("xyz", centre.offset, centre.std_error, strict=True)
         if np.isfinite(error)
     )
-    text = (
-        f"the stiffness is most nearly diagonal with the reference points moved by {where} (standard error): the "
-        f"largest coupling falls from {centre.coupling_before:.2g} to {centre.coupling:.2g} (elastic_centre)"
-    )
-    return [note("reference point", text)]
+    numbers = {"offset": where, "before": centre.coupling_before, "after": centre.coupling}
+    return [Finding("reference-point-offset", numbers)]
 
 
 def _sides(problem: FitProblem) -> list[Finding]:
     """Say what is known of sides that bend between channels and joint."""
     frfs, added = problem.frfs, problem.added_compliance
     if problem.model_errors is not None:
-        text = (
-            "the FRFs were corrected by the models of the sides, so that the joint is that between its reference "
-            f"points; intervals allow for errors of these models ({len(problem.model_errors)} that the FRFs would show)"
-        )
-        return [note("sides", text)]
+        return [Finding("sides-corrected", {"errors": len(problem.model_errors)})]
     if Transforms(frfs.responses, frfs.forces).are_units or problem.bending is not None:
         return []
     if added is None or not added.any():
-        text = (
-            "the channels cannot check that the sides of the joint are rigid between them: what their flexibility does "
-            "is not in the intervals"
-        )
-        return [note("sides", text)]
+        return [Finding("sides-unchecked")]
     known = [(dof, value) for dof, value in zip(problem.dofs, added, strict=True) if value > 0]
     values = ", ".join(f"{value:.2g} {compliance_unit(dof, dof)} for {dof}" for dof, value in known)
-    text = f"the sides have about this compliance between the channels, and intervals allow for it: {values}"
-    return [note("sides", text, tuple(dof for dof, _ in known))]
+    return [Finding("sides-flexible", {"values": values}, tuple(dof for dof, _ in known))]
 
 
 def _seen(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[Finding]:
     """Say what the numbers are between virtual points on sides that may bend, and what would narrow the intervals."""
     if not fit.seen:
         return []
-    text = (
-        "stiffnesses and damping are those of the joint alone, without what the sides give way between channels and "
-        "joint; as seen are both together, softer"
-    )
-    found = [note("sides", text)]
+    found = [Finding("sides-removed")]
     for part, cure in _CURES:
         names = tuple(
             name
@@ -312,7 +276,7 @@ def _seen(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[Finding]:
             if getattr(one, part) == max(one.sides, one.inertia, one.noise) and _is_wide(*intervals[name])
         )
         if names:
-            found.append(note("sides", f"what would narrow the intervals of {', '.join(names)}: {cure}", names))
+            found.append(Finding("interval-cause", {"cure": cure}, names))
     return found
 
 
@@ -349,11 +313,8 @@ def _hidden_lines(result: JointEstimate, dofs: tuple[str, ...]) -> list[Finding]
     for group in result.groups:
         beside, total = group.unknown_cross, group.used.size
         if beside is not None and beside.hidden > _UNTRUSTED * total:
-            text = (
-                f"on {beside.hidden} of {total} lines noise hides gamma_jk of {_named(group.dofs, dofs)} "
-                "(nearly singular): they count less"
-            )
-            found.append(note("left out", text, tuple(dofs[d] for d in group.dofs)))
+            about = tuple(dofs[d] for d in group.dofs)
+            found.append(Finding("lines-hidden", {"hidden": int(beside.hidden), "total": total}, about))
     return found
 
 
@@ -364,30 +325,21 @@ def _unknown_cross(result: JointEstimate, dofs: tuple[str, ...], cross: CrossTer
         beside = group.unknown_cross
         if beside is None:
             continue
-        whose, about = _named(group.dofs, dofs), tuple(dofs[d] for d in group.dofs)
+        about = tuple(dofs[d] for d in group.dofs)
         if cross != "ignore":
-            text = f"no joint without cross terms is near the data of {whose}: its cross terms were ignored"
-            found.append(warn("cross terms", text, about))
+            found.append(Finding("cross-terms-ignored", about=about))
         if not beside.is_symmetric:
-            text = (
-                f"the compliance between {whose} is not symmetric: the DOFs of both sides are not those of one point, "
-                "or more than a joint connects them; its symmetry was not used"
-            )
-            found.append(warn("cross terms", text, about))
+            found.append(Finding("compliance-unsymmetric", about=about))
         if beside.scatter is not None:
             share = beside.scatter / np.maximum(group.x[: len(group.dofs)], np.finfo(float).tiny)
             varying = [f"{dofs[d]} by {100 * s:.0f} %" for d, s in zip(group.dofs, share, strict=True) if s > _VARIES]
-            text = (
-                f"the compliance varies from line to line beyond its noise: {', '.join(varying)}; "
-                "its mean was fitted, weighted by what the lines show"
-            )
-            found += [warn("residual", text, about)] if varying else []
+            found += [Finding("compliance-scatter", {"varying": tuple(varying)}, about)] if varying else []
     return found
 
 
 def _band_parts(found: ManifoldFit) -> list[Finding]:
     """Name parameters on which parts of the band do not agree, each fitted by itself."""
-    parts, warnings = found.parts, []
+    parts, findings = found.parts, list[Finding]()
     if parts is None or found.cross_fits:
         return []
     names = [one.name for one in found.estimate.parameters]
@@ -398,12 +350,9 @@ def _band_parts(found: ManifoldFit) -> list[Finding]:
                 for value, (low, high) in zip(values, parts.spans, strict=True)
                 if np.isfinite(value)
             )
-            text = (
-                f"{name}: parts of the band, fitted by themselves, do not agree: {seen}; the interval allows "
-                "for that, but the joint as described does not fit the data"
-            )
-            warnings.append(warn("trend", text, (name,), parts.spans))
-    return warnings
+            numbers = {"parameter": name, "values": seen}
+            findings.append(Finding("band-parts-differ", numbers, (name,), tuple(parts.spans)))
+    return findings
 
 
 def _scattering(fit: Fit, chances: FloatArray) -> list[Finding]:
@@ -412,26 +361,23 @@ def _scattering(fit: Fit, chances: FloatArray) -> list[Finding]:
         return []
     clear = _BY_CHANCE / len(fit.parameters)
     wide = tuple(one.name for one, chance in zip(fit.parameters, chances, strict=True) if chance < clear)
-    text = (
-        f"{', '.join(wide)}: parts of the band scatter more than the noise explains; the intervals are widened by that"
-    )
-    return [warn("trend", text, wide)] if wide else []
+    return [Finding("band-scatter", about=wide)] if wide else []
 
 
 def _misfit(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
     """Say whether the residual differs from the noise, and how."""
     misfit, noise = found.test, problem.noise
     by_part = noise.is_given and abs(misfit.ratio / np.sqrt(2) - 1) < _BY_PART
-    why = _COUPLED if found.cross_fits else _PER_PART if by_part else None
-    findings = _too_large(misfit, "the joint does not fit the data", why) if not noise.is_assumed else []
+    why = "coupled" if found.cross_fits else "per-part" if by_part else ""
+    findings = _too_large(misfit, why) if not noise.is_assumed else []
     # What the inertia of sides changes over frequency is in the intervals of the joint alone.
     for trend in () if found.cross_fits or found.alone is not None else misfit.trends:
         low, high = trend.values.argmin(), trend.values.argmax()
-        text = (
-            f"{trend.name} is not one constant over frequency: parts of the band give {trend.values[low]:.3g} .. "
-            f"{trend.values[high]:.3g} (near {trend.centres[low]:.4g} and {trend.centres[high]:.4g} Hz)"
-        )
-        findings.append(warn("trend", text, (trend.name,)))
+        numbers = {
+            "parameter": trend.name, "first": float(trend.values[low]), "first_hz": float(trend.centres[low]),
+            "last": float(trend.values[high]), "last_hz": float(trend.centres[high]),
+        }  # fmt: skip
+        findings.append(Finding("frequency-dependent", numbers, (trend.name,)))
     return findings
 
 
@@ -443,13 +389,8 @@ def _small_residual(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
     of_setups = noise.calibration is not None and noise.calibration.setups is not None
     if noise.is_assumed or problem.sides_bend or of_setups or not misfit.is_small:
         return []
-    why = "said" if noise.is_given else "their reciprocity shows"
-    mean = _MEAN_OF_TWO if problem.frfs.symmetrised and noise.is_given else ""
-    text = (
-        f"the residual is {misfit.ratio:.2g} times the noise: the FRFs have less noise than {why}, or were smoothed"
-        f"{mean}; the intervals are wider than they need be"
-    )
-    return [note("residual", text)]
+    variant = "" if not noise.is_given else "mean" if problem.frfs.symmetrised else "given"
+    return [Finding("residual-small", {"ratio": misfit.ratio}, variant=variant)]
 
 
 # ---------------------------------------------------------------- laws, FRFs between all joint DOFs
@@ -482,7 +423,7 @@ def describe_laws(found: ManifoldFit, joint: LawJoint) -> Fit:
         *_left_out_lines(result, problem.dofs, found.test),
         *_left_out_dofs(problem),
         *poor_laws(fit, is_log, lambda name: intervals.of(name, 0.95)),
-        *([] if problem.noise.is_assumed else _too_large(found.test, "these laws do not fit the data")),
+        *([] if problem.noise.is_assumed else _too_large(found.test, "laws")),
         *_law_trends(found.test),
         *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
         *_calibration(problem.noise.calibration),
@@ -491,10 +432,9 @@ def describe_laws(found: ManifoldFit, joint: LawJoint) -> Fit:
         *_equal_points(same),
     ]
     if problem.added_compliance is not None or problem.bending is not None:
-        text = "the intervals do not allow for what is not rigid between the channels of a side"
-        findings.append(note("sides", text))
+        findings.append(Finding("sides-not-covered"))
     if not result.converged:
-        findings.append(warn("convergence", "the fit did not converge"))
+        findings.append(Finding("not-converged"))
     return fit.with_findings(findings)
 
 
@@ -502,12 +442,8 @@ def _law_trends(misfit: ResidualTest) -> list[Finding]:
     """Name parameters of laws that are not constant over frequency."""
     found = []
     for trend in misfit.trends:
-        low, high = trend.values.min(), trend.values.max()
-        text = (
-            f"{trend.name} is not one constant over frequency: parts of the band give {low:.3g} .. {high:.3g}: another "
-            "law may fit"
-        )
-        found.append(warn("trend", text, (trend.name,)))
+        numbers = {"parameter": trend.name, "first": float(trend.values.min()), "last": float(trend.values.max())}
+        found.append(Finding("frequency-dependent", numbers, (trend.name,), variant="laws"))
     return found
 
 
@@ -570,7 +506,7 @@ def describe_model(found: FoundModel, channels: Channels) -> Fit:
         *_correlated(fit),
     ]
     if not found.minimum.converged:
-        findings.append(warn("convergence", "the fit did not converge"))
+        findings.append(Finding("not-converged"))
     return fit.with_findings(findings)
 
 
@@ -580,7 +516,7 @@ def _model_residual(fit: Fit, found: FoundModel, channels: Channels) -> list[Fin
     if test.is_noise:
         return []
     bands = tuple((low, high) for low, high, _ in test.bands)
-    parts, about = [f"residual {test.ratio:.3g} times the noise"], []
+    parts, about = list[str](), list[str]()
     if test.bands:
         where = (f"{low:g}-{high:g} Hz ({ratio:.3g})" for low, high, ratio in test.bands[:_SHOWN])
         parts.append("most at " + ", ".join(where))
@@ -593,15 +529,14 @@ def _model_residual(fit: Fit, found: FoundModel, channels: Channels) -> list[Fin
     if np.isfinite(test.neighbours) and test.neighbours > 5:
         parts.append("smooth over frequency, as no noise is")
     if test.is_large or test.bands or test.responses or test.forces or test.neighbours > 4:
-        text = f"the models and the joint do not fit the FRFs: {'; '.join(parts)}"
-        if found.error is None or found.test_with_error.is_large:
-            text += "; the parameters carry that error, which the intervals do not allow for"
-        findings.append(warn("residual", text, tuple(about), bands))
+        is_uncovered = found.error is None or found.test_with_error.is_large
+        numbers = {"ratio": test.ratio, "where": ", ".join(parts) or "everywhere"}
+        variant = "model-uncovered" if is_uncovered else "model"
+        findings.append(Finding("residual-large", numbers, tuple(about), bands, variant=variant))
     if test.pulls:
         denied = [(fit.parameters[i].name, pull) for i, pull in test.pulls]
-        pulled = ", ".join(f"{name} by {pull:+.1f}" for name, pull in denied[:_SHOWN])
-        text = f"the FRFs deny what was believed, in standard deviations of the prior: {pulled}"
-        findings.append(warn("prior", text, tuple(name for name, _ in denied)))
+        pulls = tuple(f"{name} {pull:+.1f}" for name, pull in denied)
+        findings.append(Finding("prior-contradicted", {"pulls": pulls}, tuple(name for name, _ in denied)))
     return findings
 
 
@@ -609,26 +544,16 @@ def _model_error(found: FoundModel) -> list[Finding]:
     """Say which error of the models the intervals allow for."""
     if found.error is None:
         return []
-    level, left = 100 * found.error.level, found.test_with_error
+    level, left = found.error.level, found.test_with_error
     if level == 0:
         whole = found.problem.prediction.whole
-        largest = 100 * max(found.error.of_part(part.error_level) for part in whole.parts.values())
-        text = (
-            f"the intervals allow for errors of the models of {largest:.2g} % of their modal stiffnesses and masses, "
-            "more beyond the band, beside their unknowns (model_error): as believed, or as the FRFs do not exclude"
-        )
-        return [note("model", text)]
-    text = (
-        f"beside their unknowns the models are off by {level:.2g} % of their modal stiffnesses and masses, which the "
-        "intervals allow for"
-    )
-    if left.is_large:
-        text = (
-            f"with models that are off by {level:.2g} % of their modal stiffnesses and masses beside their unknowns, "
-            f"the residual is still {left.ratio:.3g} times the noise: the intervals allow for a part of the error only"
-        )
+        largest = max(found.error.of_part(part.error_level) for part in whole.parts.values())
+        return [Finding("model-error", {"level": largest}, variant="given")]
     is_clear = found.error.gain > _CLEAR_GAIN or not found.test.is_noise
-    return [warn("model", text) if is_clear else note("model", text)]
+    severity: Severity = "warning" if is_clear else "note"
+    if left.is_large:
+        return [Finding("model-error", {"level": level, "ratio": left.ratio}, severity=severity, variant="large")]
+    return [Finding("model-error", {"level": level}, severity=severity)]
 
 
 def _separation(found: FoundModel) -> list[Finding]:
@@ -647,10 +572,10 @@ def _separation(found: FoundModel) -> list[Finding]:
             ]
             total = sum(weight * value[name] for weight, name in zip(weights, one.names, strict=True))
             sums.append(f"{' '.join(terms).removeprefix('+ ')} = {total:.4g} +- {std:.2g}")
-        text = f"the FRFs do not separate {', '.join(one.names)} of the joints {', '.join(joints)}"
-        text += ": their priors do" if one.is_held_by_prior else ""
-        text += f"; known is {'; '.join(sums)}" if sums else ""
-        findings.append((note if one.is_held_by_prior else warn)("direction", text, one.names))
+        numbers = {"joints": tuple(joints), "sums": "; ".join(sums)}
+        variant = "-".join(word for word, is_so in (("prior", one.is_held_by_prior), ("known", sums)) if is_so)
+        severity: Severity = "note" if one.is_held_by_prior else "warning"
+        findings.append(Finding("joints-not-separated", numbers, one.names, severity=severity, variant=variant))
     return findings
 
 
@@ -661,25 +586,20 @@ def _coefficient(weight: float) -> str:
 def _groups_of_joints(found: FoundModel) -> list[Finding]:
     """Say which joints are equal, and how far those that are alike scatter."""
     vector, whole = found.problem.vector, found.problem.prediction.whole
-    said = [
-        note("groups", f"{', '.join(others)}: the same as {first}", (first, *others)) for first, *others in whole.same
-    ]
+    said = [Finding("equal-points", about=tuple(own)) for own in whole.same]
     for one in vector.means:
         mean = vector.all[one.mean]
         std = one.std if mean.is_log else one.std / max(abs(found.values[one.mean]), np.finfo(float).tiny)
-        how = "given" if one.relative is not None else f"found from {len(one.members)} joints"
-        text = f"{mean.name} is a mean: the joints scatter about it by {100 * std:.2g} % (spread {how})"
-        said.append(note("prior", text, (mean.name, *(vector.all[i].name for i in one.members))))
+        numbers = {"parameter": mean.name, "spread": std, "joints": len(one.members)}
+        about = (mean.name, *(vector.all[i].name for i in one.members))
+        said.append(Finding("joint-spread", numbers, about, variant="" if one.relative is None else "given"))
     return said
 
 
 def _directions(directions: Sequence[OpenDirection], said: Collection[str] = ()) -> list[Finding]:
     """Say what the FRFs do not determine, by its direction, unless a prior does, or it is said already."""
     return [
-        warn(
-            "direction", f"the FRFs do not hold {_direction(one)}: moved along it, they stay within their noise",
-            tuple(name for name, _ in one.parts),
-        )
+        Finding("direction-undetermined", {"direction": _direction(one)}, tuple(name for name, _ in one.parts))
         for one in directions
         if not one.is_held_by_prior and not {name for name, _ in one.parts} <= set(said)
     ]  # fmt: skip
@@ -687,15 +607,11 @@ def _directions(directions: Sequence[OpenDirection], said: Collection[str] = ())
 
 def _direction(one: OpenDirection) -> str:
     parts = ", ".join(f"{name} {100 * change:+.2g} %" for name, change in one.parts[:_SHOWN])
-    return one.parts[0][0] if len(one.parts) == 1 else f"the direction {parts}"
+    return one.parts[0][0] if len(one.parts) == 1 else parts
 
 
 def _other_minimum(other: float) -> list[Finding]:
-    text = (
-        f"another joint fits nearly as well (-2 log likelihood higher by {other:.1f}): give values of the "
-        "joint that are nearer, or more FRFs"
-    )
-    return [warn("convergence", text)] if other < _OTHER else []
+    return [Finding("second-minimum", {"difference": float(other)})] if other < _OTHER else []
 
 
 def _priors(fit: Fit, directions: Sequence[OpenDirection], said: Collection[str]) -> list[Finding]:
@@ -704,13 +620,13 @@ def _priors(fit: Fit, directions: Sequence[OpenDirection], said: Collection[str]
     same = tuple(
         one.name for one in fit.parameters if one.prior is not None and errors[one.name] > _UNCHANGED * one.prior[1]
     )
-    found = [note("prior", f"{', '.join(same)}: known from the prior, hardly from the FRFs", same)] if same else []
+    found = [Finding("prior-unchanged", about=same)] if same else []
     held = [
         one for one in directions
         if one.is_held_by_prior and len(one.parts) > 1 and not {name for name, _ in one.parts} <= set(said)
     ]  # fmt: skip
     return found + [
-        note("prior", f"priors hold what the FRFs do not: {_direction(one)}", tuple(name for name, _ in one.parts))
+        Finding("prior-decides", {"direction": _direction(one)}, tuple(name for name, _ in one.parts))
         for one in held[:_SHOWN]
     ]
 
@@ -726,15 +642,10 @@ def poor_laws(fit: Fit, is_log: dict[str, bool], limits: Callable[[str], tuple[f
         if one.origin != "joint" or not is_log[one.name] or one.unit == "s" or errors[one.name] < _WELL * value:
             continue
         low, high = limits(one.name)
-        if not (high < float("inf") or low > 0):
-            text = f"{one}: the FRFs say nothing of it, from free to rigid (95 %)"
-            found.append(warn("open", text, (one.name,)))
-        elif not high < float("inf"):
-            text = f"{one}: cannot be distinguished from rigid; at least {low:.3g} {one.unit} (95 %)"
-            found.append(warn("open", text, (one.name,)))
+        if not high < float("inf"):
+            found.append(_unbounded(one, low, value))
         elif not low > 0:
-            text = f"{one}: cannot be distinguished from zero; at most {high:.3g} {one.unit} (95 %)"
-            found.append(warn("open", text, (one.name,)))
+            found.append(_maybe_zero(one, high))
         elif high - low > 2 * _UNCERTAIN * abs(value):
             found.append(_poor(one, low, high))
     return found
@@ -747,23 +658,19 @@ def _correlated(fit: Fit) -> list[Finding]:
         ((abs(rho[i, j]), i, j) for j in range(len(parameters)) for i in range(j) if abs(rho[i, j]) > _CORRELATED),
         reverse=True,
     )[:_SHOWN]
-    texts = ", ".join(f"{parameters[i]} and {parameters[j]} ({rho[i, j]:+.3f})" for _, i, j in pairs)
+    texts = tuple(f"{parameters[i]} and {parameters[j]} ({rho[i, j]:+.3f})" for _, i, j in pairs)
     about = tuple(dict.fromkeys(parameters[k].name for _, i, j in pairs for k in (i, j)))
-    return [note("correlation", f"correlated errors: {texts}", about)] if pairs else []
+    return [Finding("correlated-parameters", {"pairs": texts}, about)] if pairs else []
 
 
 def _noise(is_assumed: bool, inflation: float, freq_hz: FloatArray) -> list[Finding]:
     """Say how the noise was found, and whether lines share it."""
     found = []
     if is_assumed:
-        text = "the noise level is taken from the residual: the FRFs do not show it otherwise"
-        found.append(note("noise", text))
+        found.append(Finding("noise-from-residual"))
     if inflation > _INFLATED:
-        text = (
-            f"the noise of neighbouring lines is correlated: {freq_hz.size} lines say as much as "
-            f"{freq_hz.size / inflation:.0f} independent ones"
-        )
-        found.append(note("correlation", text))
+        numbers = {"lines": freq_hz.size, "independent": freq_hz.size / inflation}
+        found.append(Finding("correlated-lines", numbers))
     return found
 
 
@@ -778,55 +685,33 @@ def _calibration(errors: CalibrationErrors | None) -> list[Finding]:
         parts += [f"{what} by {' and '.join(shown)}"] if shown else []
     if not parts:
         return found
-    text = (
-        f"h_pq and h_qp differ smoothly over frequency, {', '.join(parts)} (root mean square over the band): taken for "
-        "calibration, not noise; intervals allow for as much in what h_pq and h_qp have in common"
-    )
-    if errors.resonant:
-        text += (
-            "; gains differ by the square of frequency, as where some sensors, or how they are mounted, resonate at "
-            f"about {float(f'{errors.resonance():.2g}'):.6g} Hz: all FRFs may then be too large by that, which "
-            "intervals allow for where sensors differ, and no FRF shows where all resonate alike"
-        )
-    return [*found, note("calibration", text)]
+    numbers = {"sizes": ", ".join(parts)} | ({"resonance": errors.resonance()} if errors.resonant else {})
+    return [*found, Finding("calibration-errors", numbers, variant="resonant" if errors.resonant else "")]
 
 
 def _setups(errors: SetUpErrors) -> list[Finding]:
     """Name set-ups that disagree, and say what intervals allow for."""
     found = []
     for one in errors.deviations:
-        if one.part == "resonances":
-            what = f"its resonances are {100 * one.size:+.2g} % ({100 * one.error:.1g} %)"
-        elif one.part == "gain":
-            what = f"its gain is {100 * one.size:+.2g} % ({100 * one.error:.1g} %)"
-        elif np.isfinite(one.delay):
-            what = f"its FRFs are {1e6 * one.delay:+.3g} us late ({1e6 * abs(one.error / one.size * one.delay):.1g} us)"
-        else:
-            what = f"its phase is {one.size:+.2g} rad ({one.error:.1g} rad)"
-        low, high = one.band
-        text = f"set-up {one.name} disagrees with the others: {what} off their mean at {low:.4g} to {high:.4g} Hz"
-        is_large = one.change > _USUAL_GAIN
-        if one.part == "resonances":
-            text += "; set-ups of different structures, by masses of sensors or temperature: intervals of few set-ups "
-            text += "hold less often"
-        severity: Literal["warning", "note"] = "warning" if is_large or errors.exceeds else "note"
-        found.append(Finding("calibration", severity, text, (one.name,), (one.band,)))
+        size, error, variant = one.size, one.error, one.part
+        if one.part not in ("resonances", "gain"):
+            is_late = np.isfinite(one.delay)
+            variant = "delay" if is_late else "phase"
+            size, error = (1e6 * one.delay, 1e6 * abs(error / size * one.delay)) if is_late else (size, error)
+        severity: Severity = "warning" if one.change > _USUAL_GAIN or errors.exceeds else "note"
+        numbers = {"size": float(size), "error": float(error)}
+        found.append(Finding("set-up-deviation", numbers, (one.name,), (one.band,), severity, variant))
     gain, phase = np.sqrt(errors.variance.sum(axis=1)).tolist()
-    parts = []
+    numbers = {"gain": gain, "phase": phase}
     if errors.exceeds:
-        parts.append(f"set-ups differ by more in gain than was said: {100 * gain:.2g} % instead")
+        found.append(Finding("set-up-scatter", numbers, severity="warning", variant="exceeds"))
     elif gain or phase:
-        said = "" if errors.setups.gain is None else ", as was said,"
-        parts.append(f"set-ups scatter by {100 * gain:.2g} % in gain{said} and {phase:.2g} rad in phase")
+        is_few = errors.setups.gain is None and 0 < errors.degrees[0, 0] <= _FEW_SETUPS
+        variant = "given" if errors.setups.gain is not None else "few" if is_few else ""
+        found.append(Finding("set-up-scatter", numbers, variant=variant))
     if errors.common:
-        parts.append(f"a gain of all FRFs is known to {100 * np.sqrt(errors.common):.2g} %, as was said")
-    text = f"{'; '.join(parts)}: intervals allow for what FRFs of a set-up, and all FRFs, have in common"
-    if errors.setups.gain is None and 0 < errors.degrees[0, 0] <= _FEW_SETUPS:
-        text += (
-            "; so few set-ups hardly show how they scatter: the gain of one, known to so much, narrows the intervals"
-        )
-        text += " (--setup-gain; SetUps.gain)"
-    return [*found, *([(warn if errors.exceeds else note)("calibration", text)] if parts else [])]
+        found.append(Finding("set-up-scatter", {"common": float(np.sqrt(errors.common))}, variant="common"))
+    return found
 
 
 def _outlying_lines(problem: FitProblem) -> list[Finding]:
@@ -834,14 +719,12 @@ def _outlying_lines(problem: FitProblem) -> list[Finding]:
     lines = problem.noise.outlying
     if not lines.size:
         return []
-    shown = ", ".join(f"{problem.freq_hz[i]:g}" for i in lines[:8])
-    rest = f" and {lines.size - 8} more" if lines.size > 8 else ""
-    return [note("noise", f"lines with far more noise than their neighbours weigh less: {shown}{rest} Hz")]
+    return [Finding("noisy-lines", {"lines": tuple(f"{problem.freq_hz[i]:g}" for i in lines)})]
 
 
 def _left_out_dofs(problem: FitProblem) -> list[Finding]:
     """Name DOFs that are not sought, but enter those that are."""
-    return [warn("left out", str(one)) for one in problem.left_out if one.matters]
+    return [Finding("dof-left-out", {"reason": str(one)}, (one.dof,)) for one in problem.left_out if one.matters]
 
 
 def _left_out_lines(result: JointEstimate, dofs: tuple[str, ...], test: ResidualTest) -> list[Finding]:
@@ -852,22 +735,19 @@ def _left_out_lines(result: JointEstimate, dofs: tuple[str, ...], test: Residual
             continue
         out, total = int(np.count_nonzero(~group.used)), group.used.size
         if out > _UNTRUSTED * total:
-            whose = f" of {_named(group.dofs, dofs)}" if len(result.groups) > 1 else ""
-            text = f"{out} of {total} lines{whose} do not fit the joint found within their noise and are left out"
-            if test.leaves_out:
-                text += f": of all lines the residual is {test.whole:.3g} times the noise"
-            found.append(warn("left out", text, tuple(dofs[d] for d in group.dofs)))
+            numbers = {"rejected": out, "total": total, "whole": test.whole}
+            about = tuple(dofs[d] for d in group.dofs)
+            found.append(Finding("lines-rejected", numbers, about, variant="whole" if test.leaves_out else ""))
     return found
 
 
-def _too_large(misfit: ResidualTest, what: str, why: str | None = None) -> list[Finding]:
+def _too_large(misfit: ResidualTest, why: str = "") -> list[Finding]:
     """Say that the residual is more than noise, and by default where."""
     if not misfit.is_large:
         return []
-    apart = f"{abs(misfit.ratio - 1) / misfit.sigma:.0f} sigma"
-    text = f"the residual is {misfit.ratio:.2f} times the noise, {apart} above it: {what}"
     bands = tuple((low, high) for low, high, _ in misfit.local)
-    if why is None and misfit.local:
-        places = ", ".join(f"{low:g}-{high:g} Hz ({100 * share:.0f} %)" for low, high, share in misfit.local)
-        why = f"; the excess is local: {places}: bad lines, or local modes that the joint DOFs do not describe"
-    return [warn("residual", text + (why or ""), bands=bands)]
+    numbers: dict[str, object] = {"ratio": misfit.ratio, "sigma": abs(misfit.ratio - 1) / misfit.sigma}
+    if why in ("", "laws") and misfit.local:
+        numbers["places"] = ", ".join(f"{low:g}-{high:g} Hz ({100 * share:.0f} %)" for low, high, share in misfit.local)
+        why = "local"
+    return [Finding("residual-large", numbers, bands=bands, variant=why)]

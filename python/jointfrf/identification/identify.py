@@ -9,14 +9,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf.channels.check.bent import bent_of_channels, refuse_bent
+from jointfrf.channels.check.amplitude import amplitude_of_channels, refuse_amplitude
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
-from jointfrf.channels.check.finding import FrfCheck, FrfFinding
+from jointfrf.channels.check.result import FrfCheck
 from jointfrf.frf.bands import spread_lines
 from jointfrf.frf.setups import SetUps
 from jointfrf.identification.compliance_data import as_pair, channel_names, compliance_data
 from jointfrf.identification.describe import describe_laws, describe_springs
-from jointfrf.identification.findings import note, of_bent_frfs
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
 from jointfrf.identification.manifold.fit import fit_laws, fit_springs
 from jointfrf.identification.manifold.prepare import (
@@ -33,6 +32,7 @@ from jointfrf.identification.result import Fit
 from jointfrf.identification.side_models import SideModel
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, as_not_negative, check_type
 from jointfrf.laws.law_joint import LawJoint
+from jointfrf.messages.finding import Finding
 
 __all__ = ["identify"]
 
@@ -183,7 +183,7 @@ def identify(
     raw = None if sides is None else measured.h[np.isin(measured.freq_hz, problem.freq_hz)]
     bent = _look_at(problem, transform, raw)
     if not accept_bent:
-        refuse_bent(bent)
+        refuse_amplitude(bent)
     if joint is None:
         found = fit_springs(problem)
         fit = describe_springs(found, problem)
@@ -196,7 +196,7 @@ def identify(
         found = fit_laws(problem, joint)
         fit = describe_laws(found, joint)
     fit = replace(fit, data=compliance_data(found, problem, transform))
-    fit = fit.with_findings([*fit.findings, *of_bent_frfs(bent)])
+    fit = fit.with_findings([*fit.findings, *bent])
     fit.issue_warnings()
     return fit
 
@@ -213,18 +213,18 @@ def _check_sides(sides: tuple[SideModel, SideModel] | None) -> tuple[SideModel, 
 
 def _look_at(
     problem: FitProblem, transform: Transform | tuple[Transform, Transform] | None, raw: ComplexArray | None
-) -> list[FrfFinding]:
+) -> list[Finding]:
     """Warn of FRFs that look wrong; return what is bent by amplitude: of `raw` ones where models corrected them."""
     h = problem.frfs.measured if raw is None else raw
     if problem.options.reciprocal:
         transforms = None if transform is None else (problem.frfs.responses, problem.frfs.forces)
         check = _checked(MeasuredFrfs(problem.freq_hz, problem.frfs.measured), problem.dofs, transforms)
         warn_of_frfs(check, 3)
-        if raw is None and all(one.kind != "bent" for one in check.findings):
+        if raw is None and all(one.code != "amplitude-dependent" for one in check.findings):
             return []
     # by the names of the channels
     names = channel_names(problem.frfs, problem.dofs, as_pair(transform))
-    return bent_of_channels(problem.freq_hz, h, *names)
+    return amplitude_of_channels(problem.freq_hz, h, *names)
 
 
 def _checked(
@@ -307,13 +307,11 @@ def _without_window(fit: Fit, decay: float) -> Fit:
     if k_lines is not None:
         damping: FloatArray = fit.damping_matrix
         k_lines = k_lines - decay * damping
-    shown = ", ".join(
+    shown = tuple(
         f"{one.name} by {value:.3g} {one.unit}" for one, value in zip(fit.parameters, moved, strict=True) if value
     )
-    text = (
-        f"an exponential window, exp(-{decay:g} t), adds {decay:g} /s times c to k: taken off {shown or 'no stiffness'}"
-    )
+    removed = Finding("window-removed", {"decay": decay, "shown": shown or "no stiffness"})
     return replace(
         fit, estimate=estimate, covariance=covariance, k_lines=k_lines,
-        intervals=Intervals(seen.names, limits, of_function), findings=(*fit.findings, note("window", text)),
+        intervals=Intervals(seen.names, limits, of_function), findings=(*fit.findings, removed),
     )  # fmt: skip

@@ -9,10 +9,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.channels.check.bent import bent_of_channels, refuse_bent
+from jointfrf.channels.check.amplitude import amplitude_of_channels, refuse_amplitude
 from jointfrf.frf.setups import SetUps
 from jointfrf.identification.describe import describe_model
-from jointfrf.identification.findings import of_bent_frfs
 from jointfrf.identification.identify import identify
 from jointfrf.identification.manifold.coordinates import CrossTerms
 from jointfrf.identification.model.assembly import Assembly
@@ -142,16 +141,16 @@ def identify_model(
     known = NoiseOptions(noise, coherence, averages, setups=setups)
     problem = prepare_model_fit(freq_hz, h, assembly, channels, known, fixed, _springs_at_joint)
     check_type("accept_bent", accept_bent, bool)
-    bent = bent_of_channels(problem.freq_hz, problem.measured, channels.responses, channels.forces)
+    bent = amplitude_of_channels(problem.freq_hz, problem.measured, channels.responses, channels.forces)
     if not accept_bent:
-        refuse_bent(bent)
+        refuse_amplitude(bent)
     search = find_channel_change(problem, channels) if find_wrong_channels else None
     if search is not None and search.change is not None:
         lines = search.change.of(as_lines("h", h))
         known = _changed(known, search.change)
         problem = prepare_model_fit(freq_hz, lines, assembly, channels, known, fixed, _springs_at_joint)
     fit = describe_model(fit_assembly(problem), channels)
-    fit = fit.with_findings([*fit.findings, *([] if search is None else [search.finding]), *of_bent_frfs(bent)])
+    fit = fit.with_findings([*fit.findings, *([] if search is None else [search.finding]), *bent])
     fit.issue_warnings()
     return fit
 

@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -16,12 +16,13 @@ from jointfrf.dofs import Parameter
 from jointfrf.errors import FileContentError
 from jointfrf.files import check_file, write_file
 from jointfrf.identification.derived import Derived
-from jointfrf.identification.findings import Finding, FitFindingKind
 from jointfrf.identification.result import Fit, FittedParameter, SeenStiffness
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real, check_type
 from jointfrf.kernel.call import VERSION
 from jointfrf.laws.joint_toml import joint_text, read_joint_table
 from jointfrf.laws.law_joint import LawJoint
+from jointfrf.messages.finding import Finding, saved_finding
+from jointfrf.messages.message import Severity
 from jointfrf.toml.table import TomlTable
 
 __all__ = ["fit_from_dict", "fit_to_dict", "load", "read_record", "save"]
@@ -126,9 +127,7 @@ def fit_to_dict(fit: Fit, *, probabilities: Sequence[float] | None = None, lines
         "n_lines": int(fit.freq_hz.size),
         "lines_hz": _plain_lines(fit.freq_hz),
         "bands_hz": {d: [list(b) for b in own] for d, own in zip(fit.dofs, fit.bands, strict=False)},
-        "findings": [
-            asdict(one) | {"about": list(one.about), "bands": list(map(list, one.bands))} for one in fit.findings
-        ],
+        "findings": [one.to_dict() for one in fit.findings],
         "warnings": list(fit.warnings),
         "notes": list(fit.notes),
     }
@@ -480,24 +479,21 @@ def _seen_of(content: Any, _: dict[str, Any]) -> dict[str, SeenStiffness]:
 
 
 def _findings_of(content: Any, read: dict[str, Any]) -> tuple[Finding, ...]:
-    if content is None:
-        return ()
-    found = []
-    for own in content:
-        if own["kind"] not in get_args(FitFindingKind) or own["severity"] not in ("warning", "note"):
-            raise ValueError
-        bands = tuple(_pair_of(band) for band in own["bands"])
-        found.append(Finding(own["kind"], own["severity"], _text_of(own["text"], read),
-                             _texts_of(own["about"], read), bands))  # fmt: skip
-    return tuple(found)
+    return tuple(saved_finding(own, lambda text: _text_of(text, read)) for own in content or ())
 
 
 def _warnings_of(content: Any, read: dict[str, Any]) -> tuple[Finding, ...]:
-    return tuple(Finding("other", "warning", text) for text in _texts_of(content, read))
+    return _without_numbers(content, "warning", read)
 
 
 def _notes_of(content: Any, read: dict[str, Any]) -> tuple[Finding, ...]:
-    return tuple(Finding("other", "note", text) for text in _texts_of(content, read))
+    return _without_numbers(content, "note", read)
+
+
+def _without_numbers(content: Any, severity: Severity, read: dict[str, Any]) -> tuple[Finding, ...]:
+    """Return sentences of a file of version 0.1, which has no findings."""
+    own = ({"text": text, "severity": severity, "about": (), "bands": ()} for text in _texts_of(content, read))
+    return tuple(map(saved_finding, own))
 
 
 #: Keys in the order in which they are read, later ones need earlier ones: reader, and whether version 1 lacks the key.

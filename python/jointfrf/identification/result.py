@@ -16,13 +16,13 @@ from scipy.special import ndtri
 from jointfrf.dofs import Parameter, ParameterKind, parameter_name, point_and_direction
 from jointfrf.frf.bands import Band
 from jointfrf.identification.derived import Derived, DerivedFunction, derived_quantity
-from jointfrf.identification.findings import Finding, WithFindings, as_warning, worst_first
 from jointfrf.identification.fit_data import FitData, ModelData
 from jointfrf.identification.profile import Intervals
 from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_probability, one_line
 from jointfrf.laws.law_joint import LawJoint
+from jointfrf.messages.finding import Finding, WithFindings, as_warning, worst_first
 
 __all__ = [
     "Fit",
@@ -376,7 +376,7 @@ class Fit(WithFindings):
     def issue_warnings(self) -> None:
         """Issue what is in doubt as warnings of Python, at the caller of the public function that fitted."""
         for one in self.findings:
-            if one.severity == "warning":
+            if one.severity != "note":
                 warnings.warn(as_warning(one), stacklevel=3)
 
     def confidence_interval(self, probability: float = 0.95) -> dict[str, tuple[float, float]]:

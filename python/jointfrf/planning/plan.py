@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.bands import Band
-from jointfrf.identification.findings import Finding, WithFindings, note, warn
 from jointfrf.identification.model.assembly import AddedMass, Assembly
 from jointfrf.identification.model.prepare import Channels
 from jointfrf.identification.model.substructure import Unknown
@@ -25,9 +24,10 @@ from jointfrf.kernel.arguments import (
     check_type,
     one_line,
 )
+from jointfrf.messages.finding import Finding, WithFindings
 from jointfrf.planning.design import Criterion, Design, Designer, Prices, criterion_of
 from jointfrf.planning.information import FrfInformation, PlannedTest, expected_noise, narrowest_band
-from jointfrf.spelling import did_you_mean, some_of
+from jointfrf.spelling import did_you_mean
 
 __all__ = ["Addition", "MeasurementPlan", "PlanStep", "plan"]
 
@@ -159,7 +159,7 @@ class MeasurementPlan(WithFindings):
         if self.additions:
             yield ""
             yield "next: " + ", ".join(f"{one.kind} {one.dof} ({_percent(one.error)})" for one in self.additions[:3])
-        yield from (one.text if one.severity == "note" else f"warning: {one.text}" for one in self.findings)
+        yield from map(str, self.findings)
 
     def _row(self, name: str, shifted: bool) -> tuple[str, ...]:
         low, high = self.bands[name]
@@ -440,19 +440,14 @@ def _findings(found: MeasurementPlan) -> Iterator[Finding]:
     for name in found.targets:
         least = found.relative_error(found.everything, name)
         if least > _OPEN:
-            text = (
-                f"{name} stays open: with all {len(found.responses)} x {len(found.forces)} candidates its standard "
-                f"error is {100 * least:.2g} %; other places, another band, less noise or better models are needed"
-            )
-            yield warn("open", text, (name,))
+            numbers = {"sensors": len(found.responses), "hits": len(found.forces), "error": least}
+            yield Finding("target-unbounded", numbers, (name,))
     moved = [name for name, shift in found.shift.items() if abs(shift) > found.proposed.std_error[name]]
     if moved:
-        by = ", ".join(f"{name} by {100 * found.shift[name] / abs(found.value[name]):+.2g} %" for name in moved)
-        cure = "put them into the model, or use lighter ones"
-        text = f"the masses of the sensors move {by}, more than a standard error: {cure}"
-        yield warn("mass", text, tuple(moved))
+        changes = tuple(f"{name} by {100 * found.shift[name] / abs(found.value[name]):+.2g} %" for name in moved)
+        yield Finding("sensor-mass", {"changes": changes}, tuple(moved))
     for what, names, axis in (("sensor", found.responses, 1), ("hit", found.forces, 0)):
         mean = found.frf_share.mean(axis=0).sum(axis=axis)
         blind = [one for one, share in zip(names, mean.tolist(), strict=True) if share < _BLIND * mean.mean()]
         if blind:
-            yield note("blind", f"a {what} sees next to nothing of the joint at {some_of(blind, _NAMED)}", tuple(blind))
+            yield Finding("blind-channels", {"what": what}, tuple(blind))

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from jointfrf.identification.findings import Finding, note, warn
 from jointfrf.kernel.arguments import FloatArray, one_line
+from jointfrf.messages.finding import Finding
 from jointfrf.pooling.random_effects import RandomEffects
 
 __all__ = ["Estimate", "FactorSpread", "FactorTrend", "PooledParameter", "TestPlan", "pooled_parameter", "shown_chance"]
@@ -159,18 +159,15 @@ def pooled_parameter(
     found = [(i, one) for i, one in enumerate(estimates) if one is not None]
     unusable = [plan.labels[i] for i, one in found if not _is_closed(one)]
     if unusable:
-        where = ", ".join(unusable)
-        text = f"{name} is open (rigid, free, or without an interval) in {where}: mean and spread are of the others"
-        findings.append(warn("left out", text, (name,)))
+        findings.append(Finding("fit-not-pooled", {"fits": tuple(unusable)}, (name,)))
     at = np.array([i for i, one in found if _is_closed(one)], dtype=np.intp)
     used = tuple(one for _, one in found if _is_closed(one))
     if len(used) < 2:
-        findings.append(warn("left out", f"{name} is known from {len(used)} of the fits: not pooled", (name,)))
+        findings.append(Finding("parameter-not-pooled", {"count": len(used)}, (name,)))
         return None, findings
     is_log = all(_is_positive(one) for one in used)
     if not is_log:
-        text = f"{name} is not significantly above zero in some fit: averaged as it is, not by its logarithm"
-        findings.append(note("averages", text, (name,)))
+        findings.append(Finding("pooled-linearly", about=(name,)))
     names, effects = _random_effects(used, at, is_log, plan)
     outlying = _outlying(effects, names, tuple(plan.labels[i] for i in at))
     mean, ahead = _mean_and_next(effects, names, is_log, plan.probability)
@@ -276,17 +273,17 @@ def shown_chance(p_value: float) -> str:
 def _findings(pooled: PooledParameter) -> list[Finding]:
     found = []
     if pooled.outlying:
-        text = (
-            f"{pooled.name} of {', '.join(pooled.outlying)} does not belong to the others (chance below "
-            f"{100 * _SIGNIFICANT:g} % among {len(pooled.labels)}): look at it before using mean and spread"
-        )
-        found.append(warn("outlying", text, (pooled.name,)))
+        numbers = {"parameter": pooled.name, "chance": _SIGNIFICANT, "fits": len(pooled.labels)}
+        found.append(Finding("outlying-assembly", numbers, pooled.outlying))
     for one in pooled.spreads:
         if one.p_value < _SIGNIFICANT and one.factor not in (ASSEMBLY, _REPEAT):
-            text = f"{pooled.name} depends on {one.factor} (chance of this without: {shown_chance(one.p_value)})"
-            found.append(note("factor", text, (pooled.name,)))
-    for trend in pooled.trends:
-        if trend.p_value < _SIGNIFICANT:
-            text = f"{pooled.name} changes with {trend.factor} (chance of this without: {shown_chance(trend.p_value)})"
-            found.append(note("factor", text, (pooled.name,)))
+            found.append(_effect(pooled.name, one.factor, one.p_value, ""))
+    found += [
+        _effect(pooled.name, one.factor, one.p_value, "trend") for one in pooled.trends if one.p_value < _SIGNIFICANT
+    ]
     return found
+
+
+def _effect(name: str, factor: str, p_value: float, variant: str) -> Finding:
+    numbers = {"parameter": name, "factor": factor, "chance": shown_chance(p_value)}
+    return Finding("factor-effect", numbers, (name,), variant=variant)

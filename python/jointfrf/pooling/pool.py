@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.identification.findings import Finding, WithFindings
 from jointfrf.identification.result import Fit, columns_of
 from jointfrf.kernel.arguments import FloatArray, as_names, as_number, as_probability, check_type, one_line
+from jointfrf.messages.finding import Finding, WithFindings, worst_first
 from jointfrf.pooling.parameter import ASSEMBLY, Estimate, PooledParameter, TestPlan, pooled_parameter, shown_chance
 from jointfrf.spelling import did_you_mean
 
@@ -60,7 +60,7 @@ class PooledFits(WithFindings):
                 limits = f"{slope.low:.3g} .. {slope.high:.3g}"
                 trends.append((one.name, slope.factor, f"{slope.value:.3g}", limits, shown_chance(slope.p_value), by))
         tables = [columns_of(table) for table in (means, spreads, trends) if table[1:]]
-        said = [f"{one.severity}: {one.text}" for one in self.findings]
+        said = [str(one) for one in self.findings]
         return "\n\n".join("\n".join(lines) for lines in ([f"{len(self.labels)} fits"], *tables, said) if lines)
 
 
@@ -152,8 +152,7 @@ def pool(
         findings += own_findings
         if parameter is not None:
             pooled[name] = parameter
-    findings.sort(key=lambda one: one.severity != "warning")
-    return PooledFits(plan.labels, pooled, probability, tuple(findings))
+    return PooledFits(plan.labels, pooled, probability, worst_first(findings))
 
 
 def _estimates(fit: Fit) -> dict[str, tuple[str, Estimate]]:

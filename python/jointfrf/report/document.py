@@ -14,8 +14,8 @@ import numpy as np
 
 from jointfrf.dofs import Parameter
 from jointfrf.extras import check_extras, import_extra
-from jointfrf.identification.findings import Finding, worst_first
 from jointfrf.kernel.arguments import FloatArray
+from jointfrf.messages.finding import Finding, worst_first
 from jointfrf.report.chart import Chart, chart_view, style_rules
 from jointfrf.report.draw import Drawing
 from jointfrf.report.figure import Figure
@@ -161,29 +161,32 @@ _ONE_LINE = 84
 
 
 def words_of_findings(findings: Sequence[Finding]) -> list[Words]:
-    """Return warnings and notes as lists, the worst first: a line for each kind; all of a long text is folded below it.
+    """Return warnings and notes as lists, the worst first: a line for each code; all of a long text is folded below it.
 
     Examples
     --------
-    >>> from jointfrf.identification.findings import note, warn
+    >>> import jointfrf as jf
     >>> from jointfrf.report.document import words_of_findings
-    >>> (words,) = words_of_findings([note("choice", "damping of y: viscous"), note("choice", "damping of x: none")])
-    >>> words.sentences, words.folded
-    (['damping of y: viscous (and 1 more)'], [['damping of y: viscous.', 'damping of x: none.']])
+    >>> (words,) = words_of_findings([jf.Finding("equal-points", about=(a, "b")) for a in "cd"])
+    >>> words.sentences
+    ['c, b are equal joints, which share their parameters (and 1 more) [equal-points]']
+    >>> words.folded
+    [['c, b are equal joints, which share their parameters.', 'd, b are equal joints, which share their parameters.']]
     """
     words = []
-    for severity, style in (("warning", "warnings"), ("note", "notes")):
+    for severities, style in ((("error", "warning"), "warnings"), (("note",), "notes")):
         groups: dict[str, list[str]] = {}
         for one in worst_first(findings):
-            if one.severity == severity:
-                groups.setdefault(one.kind, []).append(one.text)
+            if one.severity in severities:
+                groups.setdefault(one.code, []).append(one.text)
         heads = [_head(texts) for texts in groups.values()]
         folded = [
             [f"{text}." for text in texts] if head.rstrip(".") != texts[0] else []
             for head, texts in zip(heads, groups.values(), strict=True)
         ]
         if heads:
-            words.append(Words(heads, style, folded))
+            coded = [f"{head} [{code}]" for head, code in zip(heads, groups, strict=True)]
+            words.append(Words(coded, style, folded))
     return words
 
 

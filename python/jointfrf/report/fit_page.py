@@ -281,7 +281,7 @@ def _charts(figures: Iterable[Figure], most: int, fit: Fit, what: str) -> list[C
 
 def _summary(fit: Fit, compared: ComparedFrfs, first: Part) -> Section:
     # What the reader sees first is the worst; the first figure is on the first screen of a phone, too.
-    worst = [Words([f"{fit.warnings[0]}."], "warnings")] if fit.warnings else []
+    worst = [Words([fit.warnings[0]], "warnings")] if fit.warnings else []
     known = compared.residual[np.isfinite(compared.residual)]
     of_channels = float(np.sqrt((known**2).mean())) if known.size else np.nan
     found = finding_sentences(fit)
@@ -354,7 +354,7 @@ def _frf_section(fit: Fit, compared: ComparedFrfs, charts: Sequence[Chart], most
         "between them can have: where they leave the measured ones by more than noise, the joint does not explain the "
         "data."
     ]
-    if any(one.kind == "model" for one in fit.findings):
+    if any(one.code == "model-error" for one in fit.findings):
         sentences[-1] += " The errors of the models that are named above are in them."
     loud = " that hold more than noise" if compared.silent else ""
     sentences.append(
@@ -404,7 +404,7 @@ def _noise_parts(fit: Fit, figure: Figure | None, most: int) -> list[Part]:
 def _blind_spots(fit: Fit, *, is_square: bool) -> Section:
     """Say which errors of a test no FRF shows: no interval holds them."""
     assert fit.data is not None
-    if any(one.kind == "calibration" for one in fit.findings):
+    if any(one.code == "calibration-errors" for one in fit.findings):
         seen = (
             "Sensors and hammers of the same DOFs differ by what the note on calibration says. What both have in "
             "common does not show; the intervals take it to be as large as the difference."

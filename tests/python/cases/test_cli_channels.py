@@ -79,9 +79,9 @@ def test_a_wrong_channel_is_named(tmp_path):
     result = run_command("check", tmp_path / "wrong.uff", *JOINT_WORDS)
     assert result.returncode == 1
     (error,) = [line for line in result.stdout.splitlines() if line.startswith(("error", "warning"))]
-    assert error.startswith("error: sign: response 201:+z moves against what is expected")
-    assert "the other 11 responses of side k move as one body" in error
-    assert error.endswith("turn its sign, or its direction")
+    assert error.startswith("error: response 201:+z is -")
+    assert "from the rigid motion of 11 neighbours" in error
+    assert error.endswith("Reverse its sign or its direction [channel-sign]")
     content = json.loads(run_command("check", tmp_path / "wrong.uff", *JOINT_WORDS, "--json").stdout)
     (guilty,) = [g for g in content["joint"]["agreement"] if (g["kind"], g["side"]) == ("response", "k")]
     assert guilty["channels"]["201:+z"]["blame"] > 0.9

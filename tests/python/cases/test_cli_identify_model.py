@@ -325,7 +325,7 @@ def test_what_rational_functions_miss_of_close_modes_is_no_correlated_noise():
     alone = jf.estimate_noise(frfs.freq_hz, frfs.receptance().h)
     assert alone.inflation > 4  # each line has noise of its own
     fit = jf.measured_assembly(folder / "assembly.toml", frfs).fit()
-    assert not any("neighbouring lines is correlated" in note for note in fit.notes)
+    assert not any("[correlated-lines]" in note for note in fit.notes)
     off = [
         (fit.value[name] - k) / fit.std_error[name]
         for mount, ks in own["mounts"](0).items()

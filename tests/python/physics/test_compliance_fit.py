@@ -190,7 +190,7 @@ def test_negative_damping_is_told(beams):
     """Conjugated FRFs: the fit is as good, and its damping has the wrong sign."""
     gamma = jf.pollute(beams.gamma(beams.joint), 0.01, seed=4).conj()
     fit = identified(beams.freq, gamma, beams.joint.dofs, damping="viscous")
-    assert any("significantly negative" in text for text in fit.warnings)
+    assert any("[damping-negative]" in text for text in fit.warnings)
 
 
 def test_a_stiffness_that_varies_is_told(beams):
@@ -199,7 +199,7 @@ def test_a_stiffness_that_varies_is_told(beams):
     dofs = beams.at + [4 + i for i in beams.at]
     gamma = jf.pollute(gamma[:, dofs][:, :, dofs], 0.01, seed=4)
     fit = identified(beams.freq, gamma, beams.joint.dofs, damping="viscous")
-    assert any("k_y is not one constant over frequency" in text for text in fit.warnings)
+    assert any("[frequency-dependent]" in text for text in fit.warnings)
     right = jf.pollute(beams.gamma(beams.joint), 0.01, seed=4)
     assert not identified(beams.freq, right, beams.joint.dofs, damping="viscous").warnings
 
@@ -223,7 +223,7 @@ def test_damping_of_a_dof_found_rigid_is_open_and_the_others_are_known(beams, se
     joint = jf.Joint([6e5, 5e9], [20.0, 0.0], beams.joint.dofs)
     gamma = jf.pollute(beams.gamma(joint), 0.05, seed=seed)
     fit = identified(beams.freq, gamma, joint.dofs, damping="viscous", cross=cross, noise=0.05)
-    assert any("k_theta: this DOF cannot be distinguished from a rigid one" in text for text in fit.warnings)
+    assert any("k_theta cannot be distinguished from rigid" in text for text in fit.warnings)
     limits = fit.confidence_interval(0.99)
     assert limits["c_theta"] == (-np.inf, np.inf)
     assert limits["k_theta"][1] == np.inf

@@ -44,9 +44,7 @@ def test_a_free_dof_is_found_and_bounded(c, damping, level):
         assert 0 <= low < high < 10
         held.append(low == 0)
         if low == 0:
-            assert any(
-                "k_theta: not significantly different from zero, a free DOF; at most" in one for one in fit.warnings
-            )
+            assert any("k_theta is not significantly different from zero" in one for one in fit.warnings)
         assert fit.value["k_y"] == pytest.approx(6e5, rel=0.02)
         if c[1]:
             assert fit.value["c_theta"] == pytest.approx(c[1], rel=0.05)
@@ -84,8 +82,8 @@ def test_a_hinge_has_both_bounds(damping, seeds):
         low, high = limits["k_theta"]
         assert low == 0
         assert 0.05 < high < 1
-        assert any("k_y: this DOF cannot be distinguished from a rigid one; at least" in one for one in fit.warnings)
-        assert any("k_theta: not significantly different from zero, a free DOF" in one for one in fit.warnings)
+        assert any("k_y cannot be distinguished from rigid: at least" in one for one in fit.warnings)
+        assert any("k_theta is not significantly different from zero" in one for one in fit.warnings)
         low, high = limits["c_theta"]
         assert low < 0.1 < high
         assert fit.value["c_theta"] == pytest.approx(0.1, rel=0.01)
@@ -121,7 +119,7 @@ def test_damping_that_is_not_decided_has_the_interval_of_all_kinds():
     b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end").receptance(freq)
     exact = jf.couple(a, b, jf.Joint([2000.0], [3.0]).dynamic_stiffness(freq), [1], [0])[:, 1:3, 1:3]
     fit = jf.identify(freq, jf.pollute(exact, 0.05, seed=1), ["x"])
-    assert any("the data do not decide its terms" in one for one in fit.notes)
+    assert any("[damping-averaged]" in one for one in fit.notes)
     intervals = fit.confidence_interval()
     low, high = intervals["c_x"]
     assert low <= 0 < 3 < high

@@ -85,7 +85,7 @@ def test_equal_points_share_what_both_say(cross):
     own = [one for one in fit.parameters if one.name.startswith("bolt1.")]
     squares = sum((fit.value[one.name] - truth(joint, one)) ** 2 / fit.std_error[one.name] ** 2 for one in own)
     assert squares < stats.chi2.ppf(0.999, len(own))
-    assert any(one.kind == "same" and one.about == ("bolt1", "bolt2") for one in fit.findings)
+    assert any(one.code == "equal-points" and one.about == ("bolt1", "bolt2") for one in fit.findings)
     if cross == "points":
         expected = bound(joint, gamma, [same])
         for name, error in fit.std_error.items():

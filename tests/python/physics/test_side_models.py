@@ -161,7 +161,7 @@ def test_a_joint_between_beams_is_found_by_models_of_them(wrong):
         low, high = limits[f"k_{dof}"]
         assert low < k < high
         assert fit.value[f"k_{dof}"] == pytest.approx(k, rel=0.1)
-    assert any("corrected by the models of the sides" in text for text in fit.notes)
+    assert any("[sides-corrected]" in text for text in fit.notes)
     assert not fit.seen
 
 

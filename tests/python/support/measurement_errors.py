@@ -89,10 +89,10 @@ def measured(s: Structure, kind: str, level: float, seed: int) -> tuple[np.ndarr
 
 
 class ChannelError(NamedTuple):
-    """What is done to measured FRFs, and what a check must say: kind and channel (by place; None: any or all)."""
+    """What is done to measured FRFs, and what a check must find: code and channel (by place; None: any or all)."""
 
     change: Callable[[np.random.Generator, np.ndarray, np.ndarray, int], None]
-    kind: str
+    code: str
     names_channel: bool = True
     rotation: bool | None = None  # whether the channel must be a rotation, or a displacement
     also: tuple[str, ...] = ()  # findings that must come with it
@@ -122,16 +122,16 @@ def check_with_error(s: Structure, error: ChannelError, kind: str, level: float,
     at = able[seed % len(able)]
     error.change(np.random.default_rng(seed), freq, h, at)
     check = jf.check_frfs(freq, h, labels)
-    serious = [finding for finding in check.findings if finding.level != "note"]
+    serious = [finding for finding in check.findings if finding.severity != "note"]
     own = [
         finding
         for finding in serious
-        if finding.kind == error.kind
-        and (not error.names_channel or any(labels[at] in name for name in (*finding.channels, finding.message)))
+        if finding.code == error.code
+        and (not error.names_channel or any(labels[at] in name for name in (*finding.about, finding.text)))
     ]
-    others = [finding for finding in serious if finding not in own and finding.kind not in error.also]
-    kinds = {finding.kind for finding in serious}
-    return Told(bool(own) and kinds.issuperset(error.also), not others, check)
+    others = [finding for finding in serious if finding not in own and finding.code not in error.also]
+    codes = {finding.code for finding in serious}
+    return Told(bool(own) and codes.issuperset(error.also), not others, check)
 
 
 def scaled(factor: float, *, force: bool = False) -> Callable[..., None]:
@@ -221,14 +221,14 @@ def zero_line(rng: np.random.Generator, f: np.ndarray, h: np.ndarray, at: int) -
 
 #: Errors by their names.
 ERRORS: dict[str, ChannelError] = {
-    "gain of a sensor +10 %": ChannelError(scaled(1.1), "gain"),
-    "gain of a hammer +10 %": ChannelError(scaled(1.1, force=True), "gain"),
-    "gain of a sensor +3 %": ChannelError(scaled(1.03), "gain"),
-    "delay of a sensor, 20 us": ChannelError(late(20e-6), "delay"),
-    "delay of a force, 20 us": ChannelError(late(20e-6, force=True), "delay"),
-    "sign of a sensor": ChannelError(scaled(-1.0), "sign"),
-    "sign of a force": ChannelError(scaled(-1.0, force=True), "sign"),
-    "sign of all forces": ChannelError(all_times(0, sign=-1.0), "sign", False),
+    "gain of a sensor +10 %": ChannelError(scaled(1.1), "channel-gain"),
+    "gain of a hammer +10 %": ChannelError(scaled(1.1, force=True), "channel-gain"),
+    "gain of a sensor +3 %": ChannelError(scaled(1.03), "channel-gain"),
+    "delay of a sensor, 20 us": ChannelError(late(20e-6), "channel-delay"),
+    "delay of a force, 20 us": ChannelError(late(20e-6, force=True), "channel-delay"),
+    "sign of a sensor": ChannelError(scaled(-1.0), "driving-point-sign"),
+    "sign of a force": ChannelError(scaled(-1.0, force=True), "driving-point-sign"),
+    "sign of all forces": ChannelError(all_times(0, sign=-1.0), "driving-point-sign", False),
     "conjugated, exp(-i w t)": ChannelError(all_times(0, conjugate=True), "time-convention", False),
     "accelerances": ChannelError(all_times(2), "quantity", False),
     "mobilities": ChannelError(all_times(1), "quantity", False),
@@ -237,19 +237,19 @@ ERRORS: dict[str, ChannelError] = {
     ),
     "one side in accelerance": ChannelError(one_side(2), "quantity", False),
     "one side in mobility": ChannelError(one_side(1), "quantity", False),
-    "degrees instead of radians": ChannelError(scaled(180 / np.pi), "units", rotation=True),
-    "mm instead of m": ChannelError(scaled(1e3), "units", rotation=False),
-    "g instead of m/s^2": ChannelError(scaled(1 / 9.80665), "units", rotation=False),
-    "response zero": ChannelError(put("zero"), "dead"),
-    "response noise": ChannelError(put("noise"), "dead"),
-    "force zero": ChannelError(put("zero force"), "dead"),
-    "force noise": ChannelError(put("noise force"), "dead"),
-    "response copied": ChannelError(copied(), "doubled"),
-    "force copied": ChannelError(copied(force=True), "doubled"),
-    "response doubled": ChannelError(copied(anew=True), "doubled"),
-    "force doubled": ChannelError(copied(force=True, anew=True), "doubled"),
-    "responses exchanged": ChannelError(exchanged(), "exchanged"),
-    "forces exchanged": ChannelError(exchanged(force=True), "exchanged"),
-    "NaN lines": ChannelError(nan_lines, "lines"),
+    "degrees instead of radians": ChannelError(scaled(180 / np.pi), "channel-unit", rotation=True),
+    "mm instead of m": ChannelError(scaled(1e3), "channel-unit", rotation=False),
+    "g instead of m/s^2": ChannelError(scaled(1 / 9.80665), "channel-unit", rotation=False),
+    "response zero": ChannelError(put("zero"), "dead-channel"),
+    "response noise": ChannelError(put("noise"), "dead-channel"),
+    "force zero": ChannelError(put("zero force"), "dead-channel"),
+    "force noise": ChannelError(put("noise force"), "dead-channel"),
+    "response copied": ChannelError(copied(), "doubled-channel"),
+    "force copied": ChannelError(copied(force=True), "doubled-channel"),
+    "response doubled": ChannelError(copied(anew=True), "doubled-channel"),
+    "force doubled": ChannelError(copied(force=True, anew=True), "doubled-channel"),
+    "responses exchanged": ChannelError(exchanged(), "exchanged-channels"),
+    "forces exchanged": ChannelError(exchanged(force=True), "exchanged-channels"),
+    "NaN lines": ChannelError(nan_lines, "not-finite"),
     "0 Hz": ChannelError(zero_line, "zero-frequency", False),
 }

@@ -182,7 +182,7 @@ def _brick_part(number: int, side: _Side, freq: tuple[float, ...]) -> np.ndarray
     return np.ascontiguousarray(h[:, at][:, :, at] * np.outer(signs, signs))
 
 
-#: What a check must name: kinds of the finding, and words of its message or channels, each of which must be there.
+#: What a check must name: codes of the finding, and words of its message or channels, each of which must be there.
 Named = tuple[tuple[str, ...], tuple[str, ...]]
 Fault = Callable[[np.random.Generator, SimulatedTest], tuple[SimulatedTest, Named]]
 
@@ -198,14 +198,14 @@ def _changed(test: SimulatedTest, h: np.ndarray, **more) -> SimulatedTest:
     return replace(test, frfs=replace(test.frfs, h=h, **more))
 
 
-def _times(axis: int, factor: Callable[[np.random.Generator], float], kinds: tuple[str, ...]) -> Fault:
+def _times(axis: int, factor: Callable[[np.random.Generator], float], codes: tuple[str, ...]) -> Fault:
     """A channel times a factor."""
 
     def fault(rng, test):
         i, name = _channel(rng, test, axis)
         h = test.frfs.h.copy()
         h.swapaxes(1, axis)[:, i] *= factor(rng)
-        return _changed(test, h), (kinds, (name,))
+        return _changed(test, h), (codes, (name,))
 
     return fault
 
@@ -228,7 +228,7 @@ def _swapped(axis: int) -> Fault:
         h = test.frfs.h.copy()
         across = h.swapaxes(1, axis)
         across[:, [i, j]] = across[:, [j, i]]
-        return _changed(test, h), (("exchanged",), (str(own[i]), str(own[j])))
+        return _changed(test, h), (("exchanged-channels",), (str(own[i]), str(own[j])))
 
     return fault
 
@@ -241,7 +241,7 @@ def _sensor_turned(rng, test):
     h = test.frfs.h.copy()
     h[:, [a, b]] = h[:, [b, a]]
     h[:, b] *= -1
-    return _changed(test, h), (("direction", "exchanged", "place"), (str(node),))
+    return _changed(test, h), (("channel-direction", "exchanged-channels", "channel-place"), (str(node),))
 
 
 def _wrong_place(rng, test):
@@ -252,7 +252,7 @@ def _wrong_place(rng, test):
     node, axis = able[int(rng.integers(len(able)))]
     places = {n: np.array(p) for n, p in test.frfs.coordinates.items()}
     places[node][axis] = 2 * test.at[axis] - places[node][axis]
-    return _changed(test, test.frfs.h, coordinates=places), (("place", "direction"), (str(node),))
+    return _changed(test, test.frfs.h, coordinates=places), (("channel-place", "channel-direction"), (str(node),))
 
 
 def _impact_along(rng, test):
@@ -262,7 +262,7 @@ def _impact_along(rng, test):
     word = own[i].direction
     own[i] = Channel(own[i].node, word[0] + "xyz"[("xyz".index(word[1]) + 1 + int(rng.integers(2))) % 3])
     found = _changed(test, test.frfs.h, excitations=tuple(own))
-    return found, (("direction", "place"), (f"force {own[i]}",))
+    return found, (("channel-direction", "channel-place"), (f"force {own[i]}",))
 
 
 def _copied(rng, test):
@@ -271,8 +271,8 @@ def _copied(rng, test):
     h = test.frfs.h.copy()
     noise = rng.standard_normal(h[:, i].shape) + 1j * rng.standard_normal(h[:, i].shape)
     h[:, i] = h[:, j] * (1 + 0.01 * noise)
-    kinds = ("doubled", "place", "direction", "sign", "gain", "units")
-    return _changed(test, h), (kinds, (f"response {test.frfs.responses[i]}",))
+    codes = ("doubled-channel", "channel-place", "channel-direction", "channel-sign", "channel-gain", "channel-unit")
+    return _changed(test, h), (codes, (f"response {test.frfs.responses[i]}",))
 
 
 def _power_of(axis: int, power: int) -> Fault:
@@ -298,14 +298,14 @@ def _taken_for(power: int) -> Fault:
     return fault
 
 
-def _side_times(factor: float, kinds: tuple[str, ...]) -> Fault:
+def _side_times(factor: float, codes: tuple[str, ...]) -> Fault:
     """All responses of one side times a factor."""
 
     def fault(rng, test):
         side = int(rng.integers(2))
         h = test.frfs.h.copy()
         h[:, [c.node in test.nodes[side] for c in test.frfs.responses]] *= factor
-        return _changed(test, h), (kinds, ("side",))
+        return _changed(test, h), (codes, ("side",))
 
     return fault
 
@@ -319,7 +319,7 @@ def _dead(axis: int) -> Fault:
         own = h.swapaxes(1, axis)
         noise = rng.standard_normal(own[:, i].shape) + 1j * rng.standard_normal(own[:, i].shape)
         own[:, i] = np.median(abs(own[:, i])) * noise
-        return _changed(test, h), (("dead",), (name,))
+        return _changed(test, h), (("dead-channel",), (name,))
 
     return fault
 
@@ -327,17 +327,20 @@ def _dead(axis: int) -> Fault:
 def _millimetres(rng, test):
     """Coordinates of all nodes in mm, the reference point in m."""
     places = {node: 1e3 * place for node, place in test.frfs.coordinates.items()}
-    return _changed(test, test.frfs.h, coordinates=places), (("reference",), ("millimetres",))
+    return _changed(test, test.frfs.h, coordinates=places), (("coordinates-unit",), ("millimetres",))
 
 
 def _point_in_millimetres(rng, test):
-    return replace(test, at=1e3 * test.at), (("reference",), ("millimetres",))
+    return replace(test, at=1e3 * test.at), (("coordinates-unit",), ("millimetres",))
 
 
 def _point_far(rng, test):
     """The reference point is 1 to 3 m away."""
     way = rng.standard_normal(3)
-    return replace(test, at=test.at + rng.uniform(1, 3) * way / np.linalg.norm(way)), (("reference",), ("lies",))
+    return replace(test, at=test.at + rng.uniform(1, 3) * way / np.linalg.norm(way)), (
+        ("reference-point-far", "coordinates-unit"),
+        ("lies",),
+    )
 
 
 def _conjugated(rng, test):
@@ -350,7 +353,7 @@ def _one_missing(rng, test):
     i, j = int(rng.integers(h.shape[1])), int(rng.integers(h.shape[2]))
     h[:, i, j] = np.nan
     words = f"{test.frfs.responses[i]} / {test.frfs.excitations[j]}"
-    return _changed(test, h), (("missing",), (words,))
+    return _changed(test, h), (("missing-frf",), (words,))
 
 
 def _nan_lines(rng, test):
@@ -358,7 +361,7 @@ def _nan_lines(rng, test):
     i, name = _channel(rng, test, 1)
     h = test.frfs.h.copy()
     h[7:9, i] = np.nan
-    return _changed(test, h), (("lines",), (name,))
+    return _changed(test, h), (("not-finite",), (name,))
 
 
 def _factor(rng: np.random.Generator) -> float:
@@ -368,14 +371,14 @@ def _factor(rng: np.random.Generator) -> float:
 
 #: Faults by their names.
 FAULTS: dict[str, Fault] = {
-    "sign of a sensor": _times(1, lambda rng: -1.0, ("sign",)),
-    "sign of an impact": _times(2, lambda rng: -1.0, ("sign",)),
-    "sensor x 9.81": _times(1, lambda rng: 9.80665, ("units",)),
-    "sensor / 9.81": _times(1, lambda rng: 1 / 9.80665, ("units",)),
-    "sensor x 1000": _times(1, lambda rng: 1e3, ("units",)),
-    "impacts in lbf": _times(2, lambda rng: 1 / 4.4482216, ("units",)),
-    "gain of a sensor 2 to 6": _times(1, _factor, ("gain", "units")),
-    "gain of an impact 2 to 6": _times(2, _factor, ("gain", "units")),
+    "sign of a sensor": _times(1, lambda rng: -1.0, ("channel-sign",)),
+    "sign of an impact": _times(2, lambda rng: -1.0, ("channel-sign",)),
+    "sensor x 9.81": _times(1, lambda rng: 9.80665, ("channel-unit",)),
+    "sensor / 9.81": _times(1, lambda rng: 1 / 9.80665, ("channel-unit",)),
+    "sensor x 1000": _times(1, lambda rng: 1e3, ("channel-unit",)),
+    "impacts in lbf": _times(2, lambda rng: 1 / 4.4482216, ("channel-unit",)),
+    "gain of a sensor 2 to 6": _times(1, _factor, ("channel-gain", "channel-unit")),
+    "gain of an impact 2 to 6": _times(2, _factor, ("channel-gain", "channel-unit")),
     "two responses exchanged": _swapped(1),
     "two impacts exchanged": _swapped(2),
     "sensor turned by 90 degrees": _sensor_turned,
@@ -388,8 +391,8 @@ FAULTS: dict[str, Fault] = {
     "receptance read as accelerance": _taken_for(-2),
     "accelerance read as mobility": _taken_for(1),
     "accelerance read as receptance": _taken_for(2),
-    "a side in g": _side_times(1 / 9.80665, ("units",)),
-    "a side with the wrong sign": _side_times(-1.0, ("sign",)),
+    "a side in g": _side_times(1 / 9.80665, ("channel-unit",)),
+    "a side with the wrong sign": _side_times(-1.0, ("driving-point-sign",)),
     "response noise": _dead(1),
     "impact noise": _dead(2),
     "coordinates in mm": _millimetres,
@@ -412,11 +415,11 @@ class FaultFound:
 
 def check_with_fault(name: str, seed: int) -> FaultFound:
     """Put one fault in a simulated test and look at it."""
-    test, (kinds, words) = FAULTS[name](np.random.default_rng([seed, 1]), simulated_test(seed))
+    test, (codes, words) = FAULTS[name](np.random.default_rng([seed, 1]), simulated_test(seed))
     check = test.check()
-    serious = [finding for finding in check.findings if finding.level != "note"]
+    serious = [finding for finding in check.findings if finding.severity != "note"]
     named = any(
-        finding.kind in kinds and all(word in " ".join([*finding.channels, finding.message]) for word in words)
+        finding.code in codes and all(word in " ".join([*finding.about, finding.text]) for word in words)
         for finding in serious
     )
     return FaultFound(named, len(serious), check)

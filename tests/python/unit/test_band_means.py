@@ -32,7 +32,7 @@ def test_a_decoupling_takes_what_is_measured_between_internal_points(beams):
 def test_the_note_of_a_band_mean(beams):
     gamma = beams.gamma(beams.joint)
     fit = jf.identify_band_mean(beams.freq, gamma, "inverse-substructuring", ["y", "theta"], (200, 800))
-    assert "its bias by noise is not included" in fit.notes[0]
+    assert "[band-mean-error]" in fit.notes[0]
     assert not fit.warnings
     assert list(fit.value) == ["k_y", "k_theta", "c_y", "c_theta"]
 

@@ -13,7 +13,6 @@ import jointfrf as jf
 from documents import ROOT
 from jointfrf.assembly_file.measured import measured_assembly
 from jointfrf.dofs import DIRECTIONS, joint_parameters
-from jointfrf.identification.findings import note, warn
 from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.result import Fit
 from jointfrf.report.chart import Chart, chart_view, thinned_dots, thinned_line
@@ -159,7 +158,7 @@ def test_every_fit_has_a_report(fits, kind, tmp_path):
     assert "nan" not in re.sub(r"<script>.*</script>", "", text, flags=re.DOTALL).lower().split()
     for name in fit.value:
         assert f"({name})" in text or (name.count(",") and kind == "cross")
-    for said in (*fit.warnings, *fit.notes):
+    for said in (one.text for one in fit.findings):
         assert said.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace("'", "&#39;") in text
     for limits in re.findall(r'data-limits="([^"]*)"', text):
         json.loads(limits.replace("&#34;", '"'))
@@ -230,20 +229,20 @@ def test_a_map_of_residuals_shades_by_their_logarithm_up_to_the_largest():
 
 
 def test_findings_are_a_line_a_kind_the_worst_first_and_nothing_is_lost():
-    long = "lines with far more noise than their neighbours weigh less: " + ", ".join(f"{hz} Hz" for hz in range(40))
+    lines = [f"{hz} Hz and its multiples, by the mains" for hz in range(40)]
     found = [
-        note("noise", long),
-        warn("poor", "k_y: poorly determined"),
-        warn("residual", "the joint does not explain"),
-        note("choice", "damping of y: none"),
-        note("choice", "damping of x: none"),
+        jf.Finding("noisy-lines", {"lines": lines}),
+        jf.Finding("poorly-determined", {"parameter": "k_y", "low": 1.0, "high": 3.0, "unit": "N/m"}),
+        jf.Finding("compliance-scatter", {"varying": "y"}),
+        jf.Finding("equal-points", about=("a", "b")),
+        jf.Finding("equal-points", about=("c", "d")),
     ]
     warned, noted = words_of_findings(found)
-    assert warned.sentences == ["the joint does not explain.", "k_y: poorly determined."]
+    assert [line.rpartition(" ")[2] for line in warned.sentences] == ["[compliance-scatter]", "[poorly-determined]"]
     assert [len(own) for own in noted.folded] == [1, 2]
-    assert all(len(line) < 110 for line in noted.sentences)
+    assert all(len(line) < 120 for line in (*noted.sentences, *warned.sentences))
     page = make_document(Document("Page", "", [Section("one", "One", [warned, noted])]))
-    assert page.count("<summary>") == 2
+    assert page.count("<summary>") == 4
     for one in found:
         assert one.text in page
 

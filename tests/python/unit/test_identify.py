@@ -144,7 +144,7 @@ def test_damping_of_a_coupled_joint_is_chosen_as_if_all_kinds_were_fitted(beams,
 def test_a_joint_too_stiff_to_be_seen_is_said_with_its_bound(beams):
     rigid = jf.Joint([1e12, 5e3], [0, 1.5], ["y", "theta"])
     measured = jf.pollute(beams.gamma(rigid), 0.01, seed=2)
-    with pytest.warns(jf.IdentificationWarning, match="cannot be distinguished from a rigid one; at least"):
+    with pytest.warns(jf.IdentificationWarning, match="cannot be distinguished from rigid: at least"):
         fit = jf.identify(beams.freq, measured, ["y", "theta"])
     low, high = fit.confidence_interval(0.95)["k_y"]
     assert high == np.inf
@@ -163,7 +163,7 @@ def test_a_joint_too_stiff_to_be_seen_is_said_with_its_bound(beams):
 def test_a_best_estimate_lies_above_its_lower_bound_on_a_few_lines_too(seed):
     """By the error of 1/k from the information alone it lay below it in these draws."""
     freq, measured, joint = Trial("3.3", "complex", 0.05, step=300).draw(seed)
-    with pytest.warns(jf.IdentificationWarning, match="k_theta: .* cannot be distinguished from a rigid one; at least"):
+    with pytest.warns(jf.IdentificationWarning, match="k_theta cannot be distinguished from rigid: at least"):
         fit = jf.identify(freq, measured, joint.dofs, damping="viscous")
     low, high = fit.confidence_interval(0.95)["k_theta"]
     assert 0 < low < fit.value["k_theta"] < high == np.inf

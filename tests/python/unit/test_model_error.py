@@ -174,7 +174,7 @@ def test_intervals_allow_for_a_mesh_that_is_too_coarse_beyond_the_band():
         return fit, fit.confidence_interval(0.95)["k_y"]
 
     found = [fitted(seed) for seed in range(4)]
-    said = [any(one.kind == "model" and one.severity == "warning" for one in fit.findings) for fit, _ in found]
+    said = [any(one.code == "model-error" and one.severity == "warning" for one in fit.findings) for fit, _ in found]
     held = [low < TRUE["k_y"] < high for _, (low, high) in found]
     assert sum(np.logical_or(said, held)) >= 3
     (low, high), (narrow, wide) = found[0][1], fitted(0, 0.0)[1]
@@ -184,7 +184,7 @@ def test_intervals_allow_for_a_mesh_that_is_too_coarse_beyond_the_band():
 @pytest.mark.parametrize("exact", [True, False])
 def test_no_error_is_found_in_models_that_are_right(exact):
     fits = [fit_of(assembly(TRUTH), seed, exact=exact) for seed in range(4)]
-    assert not any(one.kind == "model" and one.severity == "warning" for fit in fits for one in fit.findings)
+    assert not any(one.code == "model-error" and one.severity == "warning" for fit in fits for one in fit.findings)
     problem = problem_of(assembly(TRUTH, exact=exact))
     minimum = minimise(problem.likelihood, problem.vector.to_coordinates(problem.vector.values))
     found = with_model_error(problem.likelihood, minimum)
@@ -210,12 +210,12 @@ def test_intervals_hold_where_the_model_is_wrong(wrong, exact):
     held = 0
     for seed in range(3):
         fit = fit_of(truth, seed, exact=exact)
-        warned = [one for one in fit.findings if one.kind == "model" and one.severity == "warning"]
+        warned = [one for one in fit.findings if one.code == "model-error" and one.severity == "warning"]
         described = wrong != "mass" and not exact
         assert bool(warned) != described
         if not described:
             assert not fit.test.is_noise
-            assert "which the intervals allow for" in warned[0].text
+            assert "which the intervals cover" in warned[0].text
         intervals = fit.confidence_interval(0.95)
         held += sum(intervals[name][0] <= value <= intervals[name][1] for name, value in TRUE.items())
     # Of twelve intervals of 95 % fewer than nine hold in 1 of 5000 draws.

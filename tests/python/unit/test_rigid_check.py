@@ -50,7 +50,9 @@ def test_two_bad_channels_are_two_findings():
     h[:, :, -3] *= 9.80665
     found = jf.check_frfs(test.frfs.freq_hz, h, joint=joint).findings
     names = [f"response {joint.responses.channels[2]}", f"force {joint.forces.channels[-3]}"]
-    assert sorted((one.kind, *one.channels) for one in found) == sorted(zip(("sign", "units"), names, strict=True))
+    assert sorted((one.code, *one.about) for one in found) == sorted(
+        zip(("channel-sign", "channel-unit"), names, strict=True)
+    )
 
 
 def test_the_least_needed_channel_of_a_missing_frf_is_left_out():

@@ -17,7 +17,7 @@ FLOORS = (
     {"spelling"},
     {"errors"},
     {"files"},
-    {"extras", "kernel", "toml"},
+    {"extras", "kernel", "messages", "toml"},
     {"dofs", "parallel"},
     {"frf"},
     {"channels", "io"},

@@ -10,10 +10,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.channels.check.finding import Correction, FindingLevel, FrfFinding
 from jointfrf.channels.check.pair_ratios import PairRatios
+from jointfrf.channels.check.result import Correction, FrfFix
 from jointfrf.channels.check.signals import Measurement
 from jointfrf.kernel.arguments import FloatArray
+from jointfrf.messages.finding import Finding
+from jointfrf.messages.message import Severity
 
 __all__ = [
     "LEAST_GAIN",
@@ -222,7 +224,7 @@ def unexplained_gains(measurement: Measurement, ratios: ChannelRatios) -> FloatA
     return gain
 
 
-def gain_findings(measurement: Measurement, ratios: ChannelRatios, side: int) -> Iterator[FrfFinding | Correction]:
+def gain_findings(measurement: Measurement, ratios: ChannelRatios, side: int) -> Iterator[Finding | Correction]:
     """Report which channels have another gain than the others, or other units."""
     offsets = ratios.gain
     left = _is_significant(offsets, LEAST_GAIN)
@@ -239,12 +241,13 @@ def gain_findings(measurement: Measurement, ratios: ChannelRatios, side: int) ->
         yield finding
         name, own = measurement.of_side(side, places)
         divisor = factor if side == 1 else 1 / factor
-        yield Correction(finding.kind, f"{name} divided by {divisor:.5g}", side, own, divisor)
+        fix: FrfFix = "units" if finding.code == "channel-unit" else "gain"
+        yield Correction(fix, f"{name} divided by {divisor:.5g}", side, own, divisor)
 
 
 def _gain_finding(
     measurement: Measurement, ratios: ChannelRatios, alike: NDArray[np.bool_]
-) -> tuple[FrfFinding, list[int], float]:
+) -> tuple[Finding, list[int], float]:
     """Return the finding for channels of one factor, the channels to correct, and the factor."""
     places = np.flatnonzero(alike).tolist()
     offsets = ratios.gain
@@ -259,57 +262,38 @@ def _gain_finding(
         if turned is not None:
             places, factor, unit, rotation = others.tolist(), 1 / factor, turned, not rotation
     names = tuple(measurement.dofs[i] for i in places)
-    shown = f"h_pq / h_qp is {_times(factor, error)} for p = {', '.join(names)} and every other q"
-    if len(names) > 1:
-        shown = f"h_pq / h_qp is {_times(factor, error)} for p = {', '.join(names)} and every q but these"
-    doubt = _doubt(measurement, ratios, offsets, places)
+    doubtful = _doubtful(measurement, ratios, offsets, places)
+    numbers = {"factor": factor, "error": factor * error, "others": doubtful}
+    variant = "undecided" if doubtful else ""
     if unit is not None:
-        remedy = f"convert {'this channel' if len(names) == 1 else 'these channels'} to SI units"
-        return FrfFinding(
-            "units", "error", names, factor, 1 + _UNIT_TOLERANCE, f"{shown}: {unit}{doubt}", remedy
-        ), places, factor  # fmt: skip
-    size, opposite = ("large", "small") if factor > 1 else ("small", "large")
-    which = f"the response of {', '.join(names)} is too {size}, or the force there too {opposite}"
-    level: FindingLevel = "warning" if 1 / _GAIN_LIMIT < factor < _GAIN_LIMIT else "error"
-    remedy = (
-        "calibrate sensor and hammer of this DOF; reciprocity does not show which of the two it is, and the driving "
-        "point carries the error either way"
-    )
-    threshold = math.exp(max(LEAST_GAIN, _SIGNIFICANT * error))
-    return FrfFinding("gain", level, names, factor, threshold, f"{shown}: {which}{doubt}", remedy), places, factor
+        return Finding("channel-unit", numbers | {"unit": unit}, names, variant=variant), places, factor
+    severity: Severity = "warning" if 1 / _GAIN_LIMIT < factor < _GAIN_LIMIT else "error"
+    return Finding("channel-gain", numbers, names, severity=severity, variant=variant), places, factor
 
 
-def delay_findings(measurement: Measurement, ratios: ChannelRatios, side: int) -> Iterator[FrfFinding | Correction]:
+def delay_findings(measurement: Measurement, ratios: ChannelRatios, side: int) -> Iterator[Finding | Correction]:
     """Report which channels lag behind the others."""
     offsets = ratios.delay
     least = LEAST_PHASE / measurement.omega[-1]
     for i in np.flatnonzero(_is_significant(offsets, least)).tolist():
         delay, error = float(offsets.value[i]), float(offsets.error[i])
         name = measurement.dofs[i]
-        degrees = math.degrees(delay * measurement.omega[-1])
-        word, opposite, way = ("late", "early", "falls") if delay > 0 else ("early", "late", "rises")
-        shown = (
-            f"the phase of h_pq / h_qp {way} with frequency for p = {name}: a delay of {1e6 * delay:.3g} +- "
-            f"{1e6 * error:.2g} us, {degrees:.3g} degrees at {measurement.freq_hz[-1]:g} Hz: the response of {name} is "
-            f"{word}, or the force there {opposite}{_doubt(measurement, ratios, offsets, [i])}"
-        )
-        yield FrfFinding(
-            "delay", "warning", (name,), delay, max(least, _SIGNIFICANT * error), shown,
-            "look at the channel's filter, cable and trigger; reciprocity does not distinguish sensor from hammer",
-        )  # fmt: skip
+        way, opposite = ("late", "early") if delay > 0 else ("early", "late")
+        doubtful = _doubtful(measurement, ratios, offsets, [i])
+        numbers = {
+            "way": way, "opposite": opposite, "delay": 1e6 * abs(delay), "error": 1e6 * error,
+            "degrees": math.degrees(abs(delay) * measurement.omega[-1]), "freq": float(measurement.freq_hz[-1]),
+            "others": doubtful,
+        }  # fmt: skip
+        yield Finding("channel-delay", numbers, (name,), variant="undecided" if doubtful else "")
         label, places = measurement.of_side(side, [i])
         own = delay if side == 1 else -delay
         yield Correction("delay", f"{label} advanced by {1e6 * own:.4g} us", side, places, delay=own)
 
 
-def _times(factor: float, error: float) -> str:
-    return f"{factor:.4g} +- {factor * error:.1g}"
-
-
-def _doubt(measurement: Measurement, ratios: ChannelRatios, offsets: Offsets, places: list[int]) -> str:
-    """Name the channels that may be wrong instead: where as many agree among each other."""
+def _doubtful(measurement: Measurement, ratios: ChannelRatios, offsets: Offsets, places: list[int]) -> tuple[str, ...]:
+    """Return the channels that may be wrong instead: as many agree among each other; none where it is decided."""
     if not offsets.undecided[places].any():
-        return ""
+        return ()
     group = ratios.group == ratios.group[places[0]]
-    others = [measurement.dofs[i] for i in np.flatnonzero(group) if i not in places]
-    return f" (or {', '.join(others)} the other way: as many channels agree with each side)"
+    return tuple(measurement.dofs[i] for i in np.flatnonzero(group) if i not in places)

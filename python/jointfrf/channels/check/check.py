@@ -10,7 +10,7 @@ from typing import Literal, cast, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf.channels.check.bent import bent_findings
+from jointfrf.channels.check.amplitude import amplitude_findings
 from jointfrf.channels.check.channel_ratios import (
     LEAST_GAIN,
     LEAST_PHASE,
@@ -37,8 +37,8 @@ from jointfrf.channels.check.exchange import (
     cause_of_gains,
     hidden_exchange,
 )
-from jointfrf.channels.check.finding import Correction, FindingLevel, FrfCheck, FrfFinding, corrected
 from jointfrf.channels.check.pair_ratios import PairRatios, pair_ratios
+from jointfrf.channels.check.result import Correction, FrfCheck, FrfFix, corrected
 from jointfrf.channels.check.rigid_findings import rigid_faults
 from jointfrf.channels.check.rigid_motion import ChannelGroup, not_rigid
 from jointfrf.channels.check.sides import reference_findings, side_findings
@@ -50,8 +50,8 @@ from jointfrf.channels.check.signals import (
     check_signals,
     find_bad_lines,
 )
-from jointfrf.channels.joint_channels import PAIRS_SHOWN, JointChannels
-from jointfrf.errors import FileContentError, FrfCheckWarning
+from jointfrf.channels.joint_channels import JointChannels
+from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel
 from jointfrf.kernel.arguments import (
     ComplexArray,
@@ -63,11 +63,10 @@ from jointfrf.kernel.arguments import (
     check_choice,
     check_type,
 )
-from jointfrf.spelling import some_of
+from jointfrf.messages.finding import Finding, as_warning, worst_first
 
 __all__ = ["check_frfs", "warn_of_frfs"]
 
-FrfFix = Literal["lines", "time-convention", "exchanged", "quantity", "sign", "units", "gain", "delay"]
 #: Share of FRFs that run backwards from which all are conjugated.
 _BACKWARDS = 0.8
 #: Relative noise of channels that may hide small FRFs of joint DOFs, which are differences of large ones.
@@ -153,8 +152,8 @@ def check_frfs(
     True
     >>> h[:, 1] *= 1.1
     >>> check = jf.check_frfs(freq, h, ["a:x", "b:x", "c:x"], fix=["gain"])
-    >>> [(finding.kind, finding.channels, round(finding.value, 2)) for finding in check.findings]
-    [('gain', ('b:x',), 1.1)]
+    >>> [(finding.code, finding.about, round(finding.numbers["factor"], 2)) for finding in check.findings]
+    [('channel-gain', ('b:x',), 1.1)]
     >>> check.changes[0][:22]
     'response b:x divided b'
     """
@@ -185,7 +184,7 @@ def check_frfs(
             state.findings.extend(reference_findings(joint))
             unspoilt = _check_rigid_motion(state, joint, missing)
         _check_channels(state)
-        state.findings.extend(bent_findings(state.corrected(), state.bad_rows, state.bad_columns))
+        state.findings.extend(amplitude_findings(state.corrected(), state.bad_rows, state.bad_columns))
         if state.measurement.rows.size < 2:
             if joint is not None and unspoilt is not None:
                 state.findings.extend(_findings_at_channels(state, unspoilt, joint))
@@ -197,8 +196,8 @@ def check_frfs(
 def warn_of_frfs(check: FrfCheck, stacklevel: int = 2, *, bent: bool = False) -> None:
     """Issue a `FrfCheckWarning` for each error and warning of a check; of bent FRFs, which fits refuse, if asked."""
     for finding in check.findings:
-        if finding.level != "note" and (bent or finding.kind != "bent"):
-            warnings.warn(str(finding), FrfCheckWarning, stacklevel=stacklevel + 1)
+        if finding.severity != "note" and (bent or finding.code != "amplitude-dependent"):
+            warnings.warn(as_warning(finding), stacklevel=stacklevel + 1)
 
 
 @dataclass
@@ -210,12 +209,12 @@ class _Progress:
     read_as: str | None = None
     bad_rows: set[int] = field(default_factory=set)
     bad_columns: set[int] = field(default_factory=set)
-    findings: list[FrfFinding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     corrections: list[Correction] = field(default_factory=list)
 
-    def add(self, found: Iterable[FrfFinding | Correction]) -> None:
+    def add(self, found: Iterable[Finding | Correction]) -> None:
         for one in found:
-            if isinstance(one, FrfFinding):
+            if isinstance(one, Finding):
                 self.findings.append(one)
             else:
                 self.corrections.append(one)
@@ -228,27 +227,20 @@ class _Progress:
 
 def _missing_findings(
     missing: NDArray[np.bool_], joint: JointChannels | None, rows: Sequence[str], columns: Sequence[str]
-) -> list[FrfFinding]:
+) -> list[Finding]:
     """Name FRFs that are missing, and what a fit makes of it."""
     if not missing.any():
         return []
-    pairs = [f"{rows[i]} / {columns[j]}" for i, j in zip(*np.nonzero(missing), strict=True)]
-    verb = "is" if len(pairs) == 1 else "are"
-    text = (
-        f"{len(pairs)} of {missing.size} FRFs {verb} missing (response / force): "
-        f"{some_of(pairs, PAIRS_SHOWN)}; all others are looked at"
-    )
-    level: FindingLevel = "warning"
-    remedy = "measure them, or leave the channels out"
-    if joint is not None:
-        try:
-            left_out = joint.without_missing(~missing)[1]
-        except FileContentError as error:
-            level, text = "error", f"{text}; {error}"
-        else:
-            names = ", ".join(f"{one.kind} {one.channel} ({one.others} others on side {one.side})" for one in left_out)
-            remedy = f"a fit leaves out {names}"
-    return [FrfFinding("missing", level, tuple(pairs), len(pairs), 0, text, remedy)]
+    pairs = tuple(f"{rows[i]} / {columns[j]}" for i, j in zip(*np.nonzero(missing), strict=True))
+    numbers = {"count": len(pairs), "total": missing.size, "pairs": pairs}
+    if joint is None:
+        return [Finding("missing-frf", numbers, pairs)]
+    try:
+        left_out = joint.without_missing(~missing)[1]
+    except FileContentError as error:
+        return [Finding("missing-frf", numbers | {"reason": str(error)}, pairs, severity="error", variant="too-many")]
+    names = [f"{one.kind} {one.channel} ({one.others} others on side {one.side})" for one in left_out]
+    return [Finding("missing-frf", numbers | {"left_out": ", ".join(names)}, pairs, variant="left-out")]
 
 
 def _check_signals(state: _Progress) -> None:
@@ -310,7 +302,7 @@ def _groups(state: _Progress, joint: JointChannels, missing: NDArray[np.bool_]) 
             yield group.filled(gone[np.ix_(at, columns)])
 
 
-def _findings_at_channels(state: _Progress, joint: JointChannels, every: JointChannels) -> list[FrfFinding]:
+def _findings_at_channels(state: _Progress, joint: JointChannels, every: JointChannels) -> list[Finding]:
     """Return findings at the joint DOFs, of virtual points without the channels that are wrong."""
     rows, columns = _places_of(joint, every)
     m = state.corrected()
@@ -319,13 +311,13 @@ def _findings_at_channels(state: _Progress, joint: JointChannels, every: JointCh
     groups = _groups(state, every, m.hidden)
     share = np.max([not_rigid(group) for group in groups], axis=0)
     found = side_findings(m.freq_hz, t_out @ h @ t_in.T, share, _hidden(h, t_out, t_in), state.read_as)
-    known = {finding.kind for finding in state.findings}
-    return [finding for finding in found if finding.kind not in known]
+    known = {finding.code for finding in state.findings}
+    return [finding for finding in found if finding.code not in known]
 
 
 def _findings_at_joint(
     state: _Progress, transform: tuple[ArrayLike, ArrayLike], dofs: Sequence[str] | None
-) -> list[FrfFinding]:
+) -> list[Finding]:
     """Return findings at the joint DOFs, of kinds that the channels have not shown."""
     if not isinstance(transform, tuple | list) or len(transform) != 2:
         raise TypeError(f"transform must be a pair, for responses and forces, not {type(transform).__name__}")
@@ -355,7 +347,7 @@ def _judged_at_joint(
     channels: ComplexArray,
     transforms: tuple[FloatArray, FloatArray],
     labels: Sequence[str],
-) -> list[FrfFinding]:
+) -> list[Finding]:
     """Return findings at joint DOFs, of kinds that the channels have not shown."""
     t_out, t_in = transforms
     h = t_out @ channels @ t_in.T
@@ -363,8 +355,8 @@ def _judged_at_joint(
     joint = _Progress(as_measurement(freq_hz, h, labels, labels, hidden), state.side, state.read_as)
     _check_signals(joint)
     _check_channels(joint)
-    known = {finding.kind for finding in state.findings}
-    return [finding for finding in joint.findings if finding.kind not in known]
+    known = {finding.code for finding in state.findings}
+    return [finding for finding in joint.findings if finding.code not in known]
 
 
 def _check_channels(state: _Progress) -> None:
@@ -375,8 +367,7 @@ def _check_channels(state: _Progress) -> None:
     smooth[rows], smooth[:, columns] = 0, 0
     around = circles(m.omega, m.h, smooth)
     if around.seen and around.value > 0 and around.share >= _BACKWARDS:
-        driving = sectors(_driving(m.square))
-        state.findings.append(convention_finding(around, driving))
+        state.findings.append(convention_finding(around))
         state.corrections.append(Correction("time-convention", "all FRFs conjugated", conjugate=True))
     if not m.rows.size:
         return
@@ -422,16 +413,16 @@ def _check_ratios(state: _Progress, m: Measurement, pairs: PairRatios) -> None:
     state.add(sign_findings(m, found, sector, state.side))
     state.add(gain_findings(m, ratios, state.side))
     state.add(delay_findings(m, ratios, state.side))
-    if not any(finding.kind == "passivity" for finding in state.findings):
+    if not any(finding.code == "passivity" for finding in state.findings):
         left = state.corrected()
         noise = _noise(pairs, m.rows.size)
-        delayed = {name for finding in state.findings if finding.kind == "delay" for name in finding.channels}
+        delayed = {name for finding in state.findings if finding.code == "channel-delay" for name in finding.about}
         # Where a channel that is left out took all pairs along, nothing is known of the correlation between lines.
-        is_lost = not pairs.usable.any() and any(finding.kind == "doubled" for finding in state.findings)
+        is_lost = not pairs.usable.any() and any(finding.code == "doubled-channel" for finding in state.findings)
         inflation = np.inf if is_lost else pairs.inflation
         active = passivity_findings(left, _driving(left.square), noise, inflation)
         # A delay of a force turns its driving point the other way than one of the response that was taken out.
-        state.findings.extend(finding for finding in active if not delayed.issuperset(finding.channels))
+        state.findings.extend(finding for finding in active if not delayed.issuperset(finding.about))
 
 
 def _driving(h: ComplexArray) -> ComplexArray:
@@ -457,12 +448,10 @@ def _result(state: _Progress, freq: FloatArray, h: ComplexArray, good: np.ndarra
         freq, h = freq[good], np.ascontiguousarray(h[good])
         changes.append(f"{(~good).sum()} lines left out")
     for correction in state.corrections:
-        if correction.kind in fix:
+        if correction.fix in fix:
             h = correction.apply(2 * np.pi * freq, h)
             changes.append(correction.text)
-    levels: tuple[FindingLevel, ...] = get_args(FindingLevel)
-    findings = sorted(state.findings, key=lambda finding: levels.index(finding.level))
-    return FrfCheck(tuple(findings), freq, h, tuple(changes), _unseen(state.measurement))
+    return FrfCheck(worst_first(state.findings), freq, h, tuple(changes), _unseen(state.measurement))
 
 
 def _unseen(measurement: Measurement) -> str:

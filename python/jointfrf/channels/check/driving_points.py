@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.channels.check.finding import Correction, FrfFinding
 from jointfrf.channels.check.pair_ratios import block_medians
+from jointfrf.channels.check.result import Correction
 from jointfrf.channels.check.signals import Measurement, modulus
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
+from jointfrf.messages.finding import Finding
 
 __all__ = [
     "circles",
@@ -44,8 +45,8 @@ _LEAST_SPAN = 3.0
 _NAMES = ("receptances", "mobilities", "accelerances")
 #: What was divided too often, by the power that is left.
 _TAKEN_FOR = {
-    -1: ("mobilities that were taken for accelerances", "receptances that were taken for mobilities"),
-    -2: ("receptances that were taken for accelerances",),
+    -1: "receptances divided by i w: mobilities read as accelerances, or receptances read as mobilities",
+    -2: "receptances divided by (i w)^2: receptances read as accelerances",
 }
 
 
@@ -144,7 +145,7 @@ def _on_real_axis(u: ComplexArray) -> NDArray[np.bool_]:
 
 def passivity_findings(
     measurement: Measurement, driving: ComplexArray, noise: FloatArray, inflation: float
-) -> Iterator[FrfFinding]:
+) -> Iterator[Finding]:
     """Find driving points, shape (n_freq, n), whose Im is positive over a band.
 
     `noise` is the standard deviation of Im h / |h| on a line, shape (n,); NaN where it is not known.
@@ -165,19 +166,12 @@ def passivity_findings(
         where = np.flatnonzero(active[:, i])
         worst = int(where[np.argmax(middle[where, i])])
         side = block_medians(real[:, i : i + 1], length)[where, 0]
-        cause = (
-            "between resonances where the mass governs (Re < 0): a delay of this FRF or of all"
-            if (side < -0.5).all()
-            else "where the stiffness governs (Re > 0): this FRF, or all, are too early in time"
-            if (side > 0.5).all()
-            else "at resonances: negative damping, or the wrong sign of this FRF there"
-        )
-        yield FrfFinding(
-            "passivity", "warning", (measurement.dofs[i],), float(middle[worst, i]), _LEAST,
-            f"power comes out of the structure at {measurement.dofs[i]} near {freq[worst]:.4g} Hz: Im h / |h| is "
-            f"{middle[worst, i]:.2g} +- {error[worst, i]:.1g} in {where.size} of {middle.shape[0]} bands, {cause}",
-            "look at the phase of sensor and hammer; leave these bands out",
-        )  # fmt: skip
+        variant = "mass" if (side < -0.5).all() else "stiffness" if (side > 0.5).all() else ""
+        numbers = {
+            "freq": float(freq[worst]), "value": float(middle[worst, i]), "error": float(error[worst, i]),
+            "bands": int(where.size), "total": int(middle.shape[0]),
+        }  # fmt: skip
+        yield Finding("passivity", numbers, (measurement.dofs[i],), variant=variant)
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,24 +249,14 @@ def quantities(
     return Quantities(found_power, found_sign, contradiction, exponent, certain)
 
 
-def convention_finding(around: Circles, driving: Sectors) -> FrfFinding:
+def convention_finding(around: Circles) -> Finding:
     """Report that FRFs are conjugated."""
-    turned = (
-        f"; Im of driving points is positive on {100 * float(np.median(1 - driving.negative)):.0f} % of lines"
-        if driving.negative.size
-        else ""
-    )
-    return FrfFinding(
-        "time-convention", "error", (), around.value, 0.0,
-        f"{100 * around.share:.0f} % of the FRFs run anticlockwise through the complex plane, their responses come "
-        f"before the forces{turned}: the time convention is exp(-i w t), or the FRFs are conjugated",
-        "conjugate all FRFs",
-    )  # fmt: skip
+    return Finding("time-convention", {"share": around.share})
 
 
 def quantity_findings(
     measurement: Measurement, found: Quantities, driving: Sectors, read_as: str | None
-) -> Iterator[FrfFinding | Correction]:
+) -> Iterator[Finding | Correction]:
     """Report which responses are velocities or accelerations, or were taken for them.
 
     `read_as` is the quantity that FRFs were taken for when they were made receptances, where that is known.
@@ -284,63 +268,51 @@ def quantity_findings(
         every = places.size == found.power.size
         names = () if every else tuple(measurement.dofs[i] for i in places)
         rows = tuple(range(len(measurement.responses))) if every else tuple(map(int, measurement.rows[places]))
-        what = "the FRFs are" if every else f"the FRFs of the responses {', '.join(names)} are"
-        negative = 100 * float(np.median(driving.negative[places]))
-        negative = 100 - negative if abs(power) == 2 else negative
-        seen = f"driving points have Im {'>' if abs(power) == 2 else '<'} 0 on {negative:.0f} % of lines"
-        if every:
-            seen += f", |h| goes with w^{found.exponent + power:.1f}"
-        else:
-            seen += f", h_pq / h_qp goes with w^{power} against the other responses"
-        doubt = f" (or receptances of the wrong sign: |h| goes with w^{found.exponent + 2:.1f} on this band)"
-        doubt = "" if found.certain or power != 2 or not every else doubt
+        share = float(np.median(driving.negative[places]))
+        is_narrow = power == 2 and every and not found.certain
+        quantity, action = _quantity_and_action(power, read_as if every else None)
+        numbers = {
+            "quantity": quantity, "action": action, "half": ">" if abs(power) == 2 else "<",
+            "share": 1 - share if abs(power) == 2 else share,
+            "exponent": float(found.exponent + power) if every else power,
+        }  # fmt: skip
+        yield Finding("quantity", numbers, names, variant="narrow" if is_narrow else "" if every else "some")
         factor = ("i w", "(i w)^2")[abs(power) - 1]
-        does = f"divide by {factor}" if power > 0 else f"multiply by {factor}"
-        is_now = _NAMES[power] if power > 0 else f"receptances divided by {factor}"
-        actual = POWER_OF_I_OMEGA.get(read_as or "", -9) + power
-        if every and 0 <= actual <= 2 and read_as is not None:
-            held = _NAMES[actual]
-            was = "" if power > 0 and read_as == "receptance" else f": {held} that were read as {read_as}s"
-            was = was.replace("mobilitys", "mobilities")
-            does = f"read the file as {held}, whatever it says (quantity {tuple(POWER_OF_I_OMEGA)[actual]}, forced)"
-        elif power < 0:
-            was = f": {' or '.join(_TAKEN_FOR[power])}"
-        else:
-            was = ""
-        yield FrfFinding(
-            "quantity", "error", names, float(found.exponent + power), 0.0,
-            f"{what} {is_now}{', not receptances' if power > 0 else ''}{was}: {seen}{doubt}",
-            does if read_as is not None and every else f"{does}, or state the quantity when the file is read",
-        )  # fmt: skip
         text = f"{'all FRFs' if every else 'responses ' + ', '.join(names)} "
         text += f"{'divided' if power > 0 else 'multiplied'} by {factor}"
         yield Correction("quantity", text, 1, rows, power=power)
 
 
+def _quantity_and_action(power: int, read_as: str | None) -> tuple[str, str]:
+    """Return which quantity FRFs are, that are (i w)^power times a receptance, and what to do.
+
+    `read_as` is the quantity that all of them were taken for, where that is known.
+    """
+    factor = ("i w", "(i w)^2")[abs(power) - 1]
+    does = f"Divide by {factor}" if power > 0 else f"Multiply by {factor}"
+    actual = POWER_OF_I_OMEGA.get(read_as or "", -9) + power
+    if read_as is not None and 0 <= actual <= 2:
+        word = tuple(POWER_OF_I_OMEGA)[actual]
+        quantity = _NAMES[actual] if power > 0 and read_as == "receptance" else f"{_NAMES[actual]} read as {read_as}"
+        return quantity, f"Read the file as {_NAMES[actual]} (quantity {word}, forced)"
+    if read_as is not None:
+        return _NAMES[power] if power > 0 else _TAKEN_FOR[power], does
+    return _NAMES[power] if power > 0 else _TAKEN_FOR[power], f"{does}, or state the quantity when you read the file"
+
+
 def sign_findings(
     measurement: Measurement, found: Quantities, driving: Sectors, side: int
-) -> Iterator[FrfFinding | Correction]:
+) -> Iterator[Finding | Correction]:
     """Report which responses point against the force of the same DOF."""
     places = np.flatnonzero(found.sign < 0)
     if places.size:
         names = tuple(measurement.dofs[i] for i in places)
         every = places.size == found.sign.size
-        share = 100 * float(np.median(1 - driving.negative[places]))
-        seen = f"Im of {'all driving points' if every else 'the driving point'} is positive on {share:.0f} % of lines"
-        if not every and measurement.dofs:
-            seen += " and h_pq = -h_qp with the others"
-        who = "all responses point" if every else f"the response of {', '.join(names)} points"
-        doubt = "" if found.certain or not every else " (or the FRFs are accelerances: the band is too narrow)"
-        yield FrfFinding(
-            "sign", "error", names, share / 100, 0.5, f"{who} against the force of the same name: {seen}{doubt}",
-            "turn the sign of the response, or of the force: reciprocity does not show which of the two",
-        )  # fmt: skip
+        variant = "" if not every or len(names) == 1 else "all" if found.certain else "narrow"
+        numbers = {"share": float(np.median(1 - driving.negative[places]))}
+        yield Finding("driving-point-sign", numbers, names, variant=variant)
         name, own = measurement.of_side(side, places)
         yield Correction("sign", f"sign of {name} turned", side, own, -1.0)
     for i in np.flatnonzero(found.contradiction):
-        yield FrfFinding(
-            "passivity", "error", (measurement.dofs[i],), float(1 - driving.negative[i]), 0.5,
-            f"the driving point of {measurement.dofs[i]} has Im > 0 on {100 * (1 - driving.negative[i]):.0f} % of "
-            "lines, although its channel is reciprocal to the others: power comes out of the structure",
-            "look at this FRF: its sign, or where it was measured",
-        )  # fmt: skip
+        numbers = {"share": float(1 - driving.negative[i])}
+        yield Finding("passivity", numbers, (measurement.dofs[i],), severity="error", variant="contradiction")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -12,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.channels.check.driving_points import one_sidedness
-from jointfrf.channels.check.finding import Correction, FrfFinding
 from jointfrf.channels.check.pair_ratios import (
     BROKEN,
     ONE_SIDED,
@@ -22,8 +20,10 @@ from jointfrf.channels.check.pair_ratios import (
     are_signals,
     scatter_of,
 )
+from jointfrf.channels.check.result import Correction
 from jointfrf.channels.check.signals import Measurement
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.messages.finding import Finding
 
 __all__ = ["Cause", "broken_findings", "cause_of_broken_pairs", "cause_of_gains", "hidden_exchange"]
 
@@ -224,50 +224,27 @@ def _doubled(evidence: _Evidence, before: float) -> Cause | None:
 
 def broken_findings(
     measurement: Measurement, pairs: PairRatios, cause: Cause, side: int
-) -> Iterator[FrfFinding | Correction]:
+) -> Iterator[Finding | Correction]:
     """Report what explains that FRFs are not reciprocal, and how to correct it where that is possible."""
     names = measurement.dofs
-    number = f"{pairs.broken.sum()} of {pairs.p.size} pairs h_pq, h_qp are not the same FRF (scatter of their ratio "
-    if not pairs.broken.any():
-        number = (
-            "h_pq and h_qp differ by large factors (logarithm "
-            if cause.before > math.log(2)
-            else "with these two h_pq / h_qp varies over frequency by more than noise does (scatter "
-        )
+    count = {"broken": int(pairs.broken.sum()), "pairs": int(pairs.p.size), "scatter": cause.before}
     if cause.kind == "exchanged":
         a, b = (names[i] for i in cause.channels)
-        others = "".join(f", or {names[i]} and {names[j]}" for i, j in cause.alternatives)
-        yield FrfFinding(
-            "exchanged", "error", (a, b), cause.before, BROKEN,
-            f"the responses {a} and {b} are exchanged, or the forces there{others}: {number}{cause.before:.2g}), with "
-            f"{a} and {b} exchanged all are (scatter {cause.after:.2g})",
-            "exchange the two responses, or the two forces: both make the FRFs reciprocal, look at the test set-up",
-        )  # fmt: skip
+        others = tuple(f"{names[i]} and {names[j]}" for i, j in cause.alternatives)
+        numbers = {"before": cause.before, "after": cause.after, "others": others}
+        yield Finding("exchanged-channels", numbers, (a, b), variant="alternatives" if others else "")
         _, own = measurement.of_side(side, cause.channels)
         text = f"{'responses' if side == 1 else 'forces'} {a} and {b} exchanged"
         yield Correction("exchanged", text, side, own, exchange=True)
     elif cause.kind in ("doubled response", "doubled force"):
-        first, second = (names[i] for i in cause.channels)
         word = cause.kind.removeprefix("doubled ")
-        yield FrfFinding(
-            "doubled", "error", (f"{word} {first}", f"{word} {second}"), cause.after, BROKEN / 2,
-            f"{word} {second} shows what {word} {first} shows (scatter of their ratio {cause.after:.2g}), and "
-            f"{number}{cause.before:.2g}), all with {second}",
-            f"measure {second} again: its channel was connected to, or struck at, {first}",
-        )  # fmt: skip
+        first, second = (f"{word} {names[i]}" for i in cause.channels)
+        numbers = {"first": first, "second": second, "difference": cause.after, "scatter": cause.before}
+        yield Finding("doubled-channel", numbers, (first, second), variant="moves-alike")
     elif cause.kind == "channel":
-        name = names[cause.channels[0]]
-        yield FrfFinding(
-            "reciprocity", "error", (name,), cause.before, BROKEN,
-            f"{number}{cause.before:.2g}), all with {name}: its response or force was measured elsewhere, or is noise",
-            "look at place, direction and name of sensor and impacts of this DOF, or leave it out",
-        )  # fmt: skip
+        yield Finding("reciprocity", count, (names[cause.channels[0]],), variant="channel")
     else:
-        worst = np.argsort(-np.where(pairs.broken, pairs.scatter, -1))[: min(_SHOWN, int(pairs.broken.sum()))]
-        some = ", ".join(f"{names[pairs.p[i]]} / {names[pairs.q[i]]}" for i in worst)
-        yield FrfFinding(
-            "reciprocity", "error", tuple(dict.fromkeys(names[x] for i in worst for x in (pairs.p[i], pairs.q[i]))),
-            cause.before, BROKEN,
-            f"{number}{cause.before:.2g}): {some}{' and more' if pairs.broken.sum() > _SHOWN else ''}",
-            "look at the order of rows and columns, and at places and directions of sensors and impacts",
-        )  # fmt: skip
+        worst = np.argsort(-np.where(pairs.broken, pairs.scatter, -1))[: count["broken"]].tolist()
+        shown = tuple(f"{names[pairs.p[i]]} / {names[pairs.q[i]]}" for i in worst)
+        about = dict.fromkeys(names[x] for i in worst[:_SHOWN] for x in (pairs.p[i], pairs.q[i]))
+        yield Finding("reciprocity", count | {"worst": shown}, tuple(about))

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from jointfrf.channels.check.channel_ratios import unit_of_factor
-from jointfrf.channels.check.finding import FindingKind, FindingLevel, FrfFinding
 from jointfrf.channels.check.rigid_motion import ChannelGroup, Suspects, column_size, expected_motion, find_suspects
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
+from jointfrf.messages.finding import Finding
+from jointfrf.messages.message import Severity
 
 __all__ = ["RigidFault", "rigid_faults"]
 
@@ -46,7 +47,7 @@ _MOST_FAULTS = 3
 class RigidFault:
     """One finding about channels of a group, and which rows or columns it is about."""
 
-    finding: FrfFinding
+    finding: Finding
     word: str
     places: tuple[int, ...]
 
@@ -122,7 +123,7 @@ def rigid_faults(group: ChannelGroup, freq_hz: FloatArray, names: Sequence[str])
         left = np.setdiff1d(left, bad)
 
 
-def _finding(group: ChannelGroup, suspects: Suspects, freq_hz: FloatArray, names: Sequence[str]) -> FrfFinding | None:
+def _finding(group: ChannelGroup, suspects: Suspects, freq_hz: FloatArray, names: Sequence[str]) -> Finding | None:
     others = np.setdiff1d(np.arange(group.size), suspects.channels)
     motion = expected_motion(group, others)
     seen = [_seen(group, i, motion, freq_hz) for i in suspects.channels]
@@ -132,15 +133,10 @@ def _finding(group: ChannelGroup, suspects: Suspects, freq_hz: FloatArray, names
     error = math.sqrt(sum(one.error() ** 2 for one in some) / len(some))
     if suspects.ratio < _CLEAR_RATIO or error < _SENSOR_ERROR:
         return None
-    shown = _number(group, suspects, error, "these")
     if suspects.kind == "exchanged":
-        a, b = (names[i] for i in suspects.channels)
-        return FrfFinding(
-            "exchanged", "error", (f"{group.word} {a}", f"{group.word} {b}"), suspects.ratio, _CLEAR_RATIO,
-            f"{group.word}s {a} and {b} are exchanged: {shown}, exchanged they move as the others say",
-            "exchange the two, or their names",
-        )  # fmt: skip
-    return _sensor_finding(group, suspects, some, names, shown)
+        names_of = tuple(f"{group.word} {names[i]}" for i in suspects.channels)
+        return Finding("exchanged-channels", _beside(group, suspects, error), names_of, variant="neighbours")
+    return _sensor_finding(group, suspects, some, names, error)
 
 
 def _seen(group: ChannelGroup, i: int, motion: ComplexArray, freq_hz: FloatArray) -> _Seen:
@@ -154,27 +150,23 @@ def _on_lines(one: _Seen, lines: np.ndarray) -> _Seen:
     return _Seen(one.freq_hz[lines], one.shown[lines], one.place[lines], one.direction)
 
 
-def _number(group: ChannelGroup, suspects: Suspects, error: float, which: str) -> str:
-    others = group.size - len(suspects.channels)
-    return (
-        f"the other {others} {group.word}s of side {group.side} move as one body to {100 * suspects.rest:.2g} %, "
-        f"{which} differ{'s' if which == 'it' else ''} from that by {100 * error:.3g} %"
-    )
+def _beside(group: ChannelGroup, suspects: Suspects, error: float) -> dict[str, Any]:
+    """Return how far suspects are from the rigid motion of their neighbours, and these among each other."""
+    return {"error": error, "neighbours": group.size - len(suspects.channels), "rest": suspects.rest}
 
 
 class _Cause(NamedTuple):
-    """What is wrong with a channel."""
+    """What is wrong with a channel: code and variant of the finding, and its numbers."""
 
-    kind: FindingKind
-    value: float
-    text: str
-    remedy: str
-    level: FindingLevel = "error"
+    code: str
+    numbers: Mapping[str, Any]
+    variant: str = "neighbours"
+    severity: Severity = "error"
 
 
 def _channel_finding(
     group: ChannelGroup, suspects: Suspects, seen: _Seen, some: _Seen, names: Sequence[str], motion: ComplexArray
-) -> FrfFinding | None:
+) -> Finding | None:
     """Say what is wrong with one channel; None where the deformation of the side may be the reason."""
     place = suspects.channels[0]
     error = some.error()
@@ -192,16 +184,13 @@ def _channel_finding(
     if cause is None and not copied:
         cause = _late(seen)
     if cause is None and (copied or after < 0.5):
-        text = f"shows what {group.word} {names[other]} should show"
-        cause = _Cause("place", error, text, "look at place, direction, cable and name of both")
+        cause = _Cause("channel-place", {"other": f"{group.word} {names[other]}"}, "copy")
     if cause is None and error >= _LARGE and suspects.ratio >= _CLEAR_RATIO:
-        text = "does not belong to them, whatever its factor, sign and direction"
-        cause = _Cause("place", error, text, "look at its place, direction, cable and name, or leave it out")
+        cause = _Cause("channel-place", {}, "")
     if cause is None:
         return None
-    name = f"{group.word} {names[place]}"
-    message = f"{name} {cause.text}: {_number(group, suspects, error, 'it')}"
-    return FrfFinding(cause.kind, cause.level, (name,), cause.value, _LARGE, message, cause.remedy)
+    numbers = _beside(group, suspects, error) | dict(cause.numbers)
+    return Finding(cause.code, numbers, (f"{group.word} {names[place]}",), (), cause.severity, cause.variant)
 
 
 def _cause_in_time(group: ChannelGroup, seen: _Seen) -> _Cause | None:
@@ -212,7 +201,8 @@ def _cause_in_time(group: ChannelGroup, seen: _Seen) -> _Cause | None:
     word = {2: "an acceleration", 1: "a velocity", -1: "divided by i w once", -2: "divided by i w twice"}[power]
     if group.word == "force":
         word = f"(i w)^{power} times a force"
-    return _Cause("quantity", power, f"is {word} among others that are not", "convert it as the others are")
+    numbers = {"quantity": f"{word} among other quantities", "action": "Convert it like the other channels"}
+    return _Cause("quantity", numbers)
 
 
 def _late(seen: _Seen) -> _Cause | None:
@@ -220,8 +210,8 @@ def _late(seen: _Seen) -> _Cause | None:
     delay, left = _delay(seen)
     if left >= _EXPLAINED:
         return None
-    text = f"is {'late' if delay > 0 else 'early'} by {1e3 * abs(delay):.3g} ms"
-    return _Cause("delay", delay, text, "look at its filter, cable and trigger")
+    way = "late" if delay > 0 else "early"
+    return _Cause("channel-delay", {"way": way, "delay": 1e6 * abs(delay)}, severity="error")
 
 
 def _of_direction(group: ChannelGroup, own: FloatArray, direction: FloatArray, left: float) -> _Cause | None:
@@ -230,21 +220,16 @@ def _of_direction(group: ChannelGroup, own: FloatArray, direction: FloatArray, l
     across = float(np.linalg.norm(direction - along * own))
     if across <= _ALONG * abs(along):
         if 1 / 1.25 < -along < 1.25:
-            what = "moves against what is expected" if group.word == "response" else "acts against its direction"
-            return _Cause("sign", along, f"{what} ({along:.3g} times it)", "turn its sign, or its direction")
+            return _Cause("channel-sign", {"factor": along})
         unit = unit_of_factor(abs(along), is_rotation=False, tolerance=min(max(_UNIT, left), _UNIT_WIDEST))
-        what = f"is {along:.4g} times what is expected"
         if unit is not None and along > 0:
-            return _Cause("units", along, f"{what}, {unit}", "convert this channel to SI units")
-        level: FindingLevel = "warning" if 0.5 < along < 2 else "error"
-        return _Cause("gain", along, what, "look at its calibration, range, unit and sign", level)
+            return _Cause("channel-unit", {"factor": along, "unit": unit})
+        return _Cause("channel-gain", {"factor": along}, severity="warning" if 0.5 < along < 2 else "error")
     name, axis = _axis_of(direction)
     size = float(np.linalg.norm(direction))
     if np.linalg.norm(direction / size - axis) <= _ALONG and 0.5 < size < 2:
         given = " ".join(f"{value:.3g}" for value in own + 0.0)
-        return _Cause(
-            "direction", size, f"shows direction {name}, not {given}", "look at its direction, cable and name"
-        )
+        return _Cause("channel-direction", {"shown": name, "stated": given}, "")
     return None
 
 
@@ -302,22 +287,15 @@ def _like_another(
 
 
 def _sensor_finding(
-    group: ChannelGroup, suspects: Suspects, some: Sequence[_Seen], names: Sequence[str], shown: str
-) -> FrfFinding:
+    group: ChannelGroup, suspects: Suspects, some: Sequence[_Seen], names: Sequence[str], error: float
+) -> Finding:
     """Say whether a sensor with several channels is turned, or where it seems to be."""
-    node = group.nodes[suspects.channels[0]]
+    numbers = _beside(group, suspects, error)
     channels = tuple(f"{group.word} {names[i]}" for i in suspects.channels)
     turned = _turned(some)
     if turned is not None:
-        return FrfFinding(
-            "direction", "error", channels, suspects.ratio, _CLEAR_RATIO,
-            f"the {group.word}s of {node} show directions {turned}: {shown}", "look at how the sensor is turned",
-        )  # fmt: skip
-    return FrfFinding(
-        "place", "error", channels, suspects.ratio, _CLEAR_RATIO,
-        f"the {group.word}s of {node} do not move as their place should: {shown}",
-        f"look at the coordinates of {node}, and at how it is turned",
-    )  # fmt: skip
+        return Finding("channel-direction", numbers | {"shown": turned}, channels, variant="sensor")
+    return Finding("channel-place", numbers, channels, variant="sensor")
 
 
 def _turned(some: Sequence[_Seen]) -> str | None:

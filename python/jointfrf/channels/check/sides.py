@@ -17,11 +17,11 @@ from jointfrf.channels.check.driving_points import (
     sectors,
     sign_findings,
 )
-from jointfrf.channels.check.finding import FindingLevel, FrfFinding
 from jointfrf.channels.check.pair_ratios import are_signals
 from jointfrf.channels.check.signals import as_measurement, modulus, smoothness
 from jointfrf.channels.joint_channels import JointChannels
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.messages.finding import Finding
 
 __all__ = ["reference_findings", "side_findings"]
 
@@ -39,7 +39,7 @@ _SIDES = ("side j", "side k")
 
 def side_findings(
     freq_hz: FloatArray, h: ComplexArray, share: FloatArray, hidden: np.ndarray, read_as: str | None
-) -> Iterator[FrfFinding]:
+) -> Iterator[Finding]:
     """Compare the sides by FRFs between joint DOFs j, then k.
 
     Parameters
@@ -69,20 +69,15 @@ def side_findings(
     span = float(freq_hz[-1] / freq_hz[0])
     group = np.zeros(2, np.intp)
     found = quantities(group, powers.astype(np.intp), signs.astype(np.intp), both, exponent, span)
-    yield from (one for one in quantity_findings(named, found, both, read_as) if isinstance(one, FrfFinding))
-    yield from (
-        one for one in sign_findings(named, found, both, 1) if isinstance(one, FrfFinding) and one.kind == "sign"
-    )
+    for one in (*quantity_findings(named, found, both, read_as), *sign_findings(named, found, both, 1)):
+        if isinstance(one, Finding) and one.code in ("quantity", "driving-point-sign"):
+            yield one
     factor = math.exp(-log_factor.real)
     if power == 0 and agreed < _AGREED and not 1 / _FACTOR < factor < _FACTOR:
         unit, other = (unit_of_factor(one, is_rotation=False, tolerance=_UNIT) for one in (factor, 1 / factor))
-        what = f": {unit} on side k" if unit else f": {other} on side j" if other else ""
-        level: FindingLevel = "error"
-        yield FrfFinding(
-            "units" if what else "gain", level, _SIDES, factor, _FACTOR,
-            f"responses over forces are {factor:.4g} times as large on side k as on side j, by h_jk and h_kj{what}",
-            "convert all channels to SI units",
-        )  # fmt: skip
+        what = f"{unit} on side k" if unit else f"{other} on side j" if other else ""
+        numbers = {"factor": factor} | ({"unit": what} if what else {})
+        yield Finding("channel-unit" if what else "channel-gain", numbers, _SIDES, severity="error", variant="side")
 
 
 def _most(quarter: np.ndarray) -> int:
@@ -139,7 +134,7 @@ class _Place(NamedTuple):
         return float(np.linalg.norm(point_times * self.point - self.middle))
 
 
-def reference_findings(joint: JointChannels) -> Iterator[FrfFinding]:
+def reference_findings(joint: JointChannels) -> Iterator[Finding]:
     """Find coordinates and reference points in different units, and points far from all channels."""
     places = []
     for side in ("j", "k"):
@@ -152,38 +147,22 @@ def reference_findings(joint: JointChannels) -> Iterator[FrfFinding]:
     unit = _unit(wide[0], 1) if wide else None
     if wide or any(one.reach >= _WIDEST for one in places):
         one = max(places, key=lambda each: each.reach)
-        about = f"and the reference point {_in_metres(one.point)} is in metres: " if unit else ""
-        yield _found(
-            "error" if unit else "warning", one.reach, _WIDEST,
-            f"the coordinates of the channels look like {unit or 'millimetres'}, {about}they lie {one.reach:.3g} m "
-            f"(root mean square) about their middle on side {one.side}",
-            "give coordinates of channels, and the reference point, in metres",
-        )  # fmt: skip
+        numbers = {"unit": unit or "millimetres", "side": one.side, "reach": one.reach}
+        yield Finding("coordinates-unit", numbers, severity="error" if unit else "warning")
         return
     far = [one for one in places if one.distance() > _FAR * one.reach]
     if not far:
         return
     one, unit = far[0], _unit(far[0], -1)
-    both = "the reference point" if len(far) == len(places) else f"the reference point of side {one.side}"
-    where = (
-        f"{both}, {_in_metres(one.point)}, lies {one.distance():.3g} m from the middle of its channels, "
-        f"{one.distance() / one.reach:.3g} times their reach of {1e3 * one.reach:.3g} mm"
-    )
+    numbers = {
+        "which": "the reference point" if len(far) == len(places) else f"the reference point of side {one.side}",
+        "point": _in_metres(one.point), "distance": one.distance(), "times": one.distance() / one.reach,
+        "reach": 1e3 * one.reach,
+    }  # fmt: skip
     if unit is not None:
-        yield _found(
-            "error", one.distance() / one.reach, _FAR, f"{where}: its coordinates look like {unit}",
-            "give the reference point in metres",
-        )  # fmt: skip
+        yield Finding("coordinates-unit", numbers | {"unit": unit}, variant="reference")
     else:
-        yield _found(
-            "warning", one.distance() / one.reach, _FAR,
-            f"{where}: errors of rotations enter its displacements that many times larger",
-            "put it at the joint, or name the channels next to it",
-        )  # fmt: skip
-
-
-def _found(level: FindingLevel, value: float, threshold: float, message: str, remedy: str) -> FrfFinding:
-    return FrfFinding("reference", level, (), value, threshold, message, remedy)
+        yield Finding("reference-point-far", numbers)
 
 
 def _unit(one: _Place, way: int) -> str | None:

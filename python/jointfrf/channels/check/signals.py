@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.channels.check.finding import FrfFinding
 from jointfrf.dofs import is_rotation
 from jointfrf.frf.frf_set import Channel
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray, one_line
+from jointfrf.messages.finding import Finding
 
 __all__ = [
     "LEAST_LINES",
@@ -203,14 +203,14 @@ def _both_ways(name: str | Channel) -> tuple[str, str]:
 class BadSignals:
     """Findings, and the responses and forces that no other check can use."""
 
-    findings: list[FrfFinding]
+    findings: list[Finding]
     rows: list[int]
     columns: list[int]
 
 
 def check_signals(measurement: Measurement) -> BadSignals:
     """Find responses and forces that are dead or doubled."""
-    findings: list[FrfFinding] = []
+    findings: list[Finding] = []
     bad: list[list[int]] = []
     across = measurement.h.swapaxes(1, 2)
     smooth, square = measurement.smoothness, measurement.square
@@ -256,12 +256,9 @@ def _reciprocal(m: Measurement) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     return rows, columns
 
 
-def _dead_finding(word: str, name: str, value: float, n_freq: int) -> FrfFinding:
-    what = "is zero" if value == 0 else f"is noise: its phase agrees by {value:.2f} from line to line"
-    remedy = "connect or replace the sensor" if word == "response" else "repeat the impacts"
-    message = f"{word} {name} {what}"
-    least = _least_smoothness(n_freq)
-    return FrfFinding("dead", "error", (f"{word} {name}",), value, least, message, f"{remedy}, or leave it out")
+def _dead_finding(word: str, name: str, value: float, n_freq: int) -> Finding:
+    numbers = {"agreement": value, "least": _least_smoothness(n_freq)}
+    return Finding("dead-channel", numbers, (f"{word} {name}",), variant="zero" if value == 0 else "")
 
 
 def _copies(h: ComplexArray, dead: list[int]) -> list[tuple[int, int, float]]:
@@ -285,18 +282,13 @@ def _copies(h: ComplexArray, dead: list[int]) -> list[tuple[int, int, float]]:
     return found
 
 
-def _copy_finding(word: str, first: str, second: str, value: float) -> FrfFinding:
-    names = (f"{word} {first}", f"{word} {second}")
-    return FrfFinding(
-        "doubled", "error", names, value, _SAME,
-        f"{word}s {first} and {second} hold the same numbers, noise included (difference {value:.1e})",
-        "measure one of them again: two DOFs need two measurements",
-    )  # fmt: skip
+def _copy_finding(word: str, first: str, second: str, value: float) -> Finding:
+    return Finding("doubled-channel", {"difference": value}, (f"{word} {first}", f"{word} {second}"))
 
 
 def find_bad_lines(
     freq_hz: FloatArray, h: ComplexArray, responses: tuple[str, ...], forces: tuple[str, ...]
-) -> tuple[list[FrfFinding], NDArray[np.bool_]]:
+) -> tuple[list[Finding], NDArray[np.bool_]]:
     """Return findings about lines, and which lines are good."""
     findings = []
     finite = np.isfinite(h)
@@ -305,25 +297,13 @@ def find_bad_lines(
         findings.append(_not_finite(freq_hz, finite, good, responses, forces))
     zero = freq_hz == 0
     if zero.any():
-        findings.append(
-            FrfFinding(
-                "zero-frequency", "warning", (), int(zero.sum()), 0,
-                f"line {int(np.argmax(zero))} is at 0 Hz, where sensors of acceleration measure nothing and viscous "
-                "damping does not act",
-                "leave it out",
-            )
-        )  # fmt: skip
+        findings.append(Finding("zero-frequency", {"line": int(np.argmax(zero))}))
     ascending = np.ones(freq_hz.size, bool)
     ascending[1:] = freq_hz[1:] > np.maximum.accumulate(freq_hz)[:-1]
     if not ascending.all():
         first = int(np.argmin(ascending))
-        findings.append(
-            FrfFinding(
-                "lines", "error", (), int((~ascending).sum()), 0,
-                f"frequencies do not increase at line {first}: {freq_hz[first - 1]:g} Hz, then {freq_hz[first]:g} Hz",
-                "sort the lines and keep each frequency once",
-            )
-        )  # fmt: skip
+        numbers = {"line": first, "before": float(freq_hz[first - 1]), "after": float(freq_hz[first])}
+        findings.append(Finding("frequency-order", numbers))
     return findings, good & ~zero & ascending
 
 
@@ -333,7 +313,7 @@ def _not_finite(
     good: NDArray[np.bool_],
     responses: tuple[str, ...],
     forces: tuple[str, ...],
-) -> FrfFinding:
+) -> Finding:
     """Name the channels that hold NaN, or the lines where all do."""
     bad = ~finite
     rows, columns = np.asarray(bad.any(axis=(0, 2))), np.asarray(bad.any(axis=(0, 1)))
@@ -342,10 +322,6 @@ def _not_finite(
         some = tuple(f"response {name}" for name, is_bad in zip(responses, rows, strict=True) if is_bad)
     elif not columns.all():
         some = tuple(f"force {name}" for name, is_bad in zip(forces, columns, strict=True) if is_bad)
-    where = " of " + ", ".join(some) if some else ""
     first = int(np.argmin(good))
-    return FrfFinding(
-        "lines", "error", some, int((~good).sum()), 0,
-        f"NaN or Inf{where} in {(~good).sum()} of {good.size} lines, the first is line {first} ({freq_hz[first]:g} Hz)",
-        "leave these lines out, or these channels",
-    )  # fmt: skip
+    numbers = {"count": int((~good).sum()), "total": good.size, "line": first, "freq": float(freq_hz[first])}
+    return Finding("not-finite", numbers, some, variant="channels" if some else "")

@@ -13,12 +13,12 @@ import numpy as np
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.setups import SetUps
-from jointfrf.identification.findings import Finding, note, warn
 from jointfrf.identification.line_starts import from_lines
 from jointfrf.identification.minimise import Minimum, minimise
 from jointfrf.identification.model.fit import ModelProblem, lowest_minimum
 from jointfrf.identification.model.prepare import Channels
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.messages.finding import Finding
 
 __all__ = ["ChannelChange", "ChannelSearch", "find_channel_change"]
 
@@ -153,19 +153,19 @@ def _judged(
     least = min(best, given)
     margin = (_CLEAR + 2 * np.log(len(changes))) * max(least / count, noise)
     alike = [changes[i] for i in np.argsort(squares) if squares[i] < least + margin]
-    tried = f"{len(changes)} signs and exchanges of channels were tried"
+    tried = len(changes)
     if given < best + margin or given - best < _EXPLAINED * (given - noise * count):
         if given < least + margin and alike:
-            text = f"the FRFs fit as well with {_either(alike)} and do not show which holds; {tried}"
-            return ChannelSearch(None, note("channels", text, _named(alike)))
-        return ChannelSearch(None, note("channels", f"{tried}, and none fits as well as the names that were given"))
+            numbers = {"changes": _either(alike), "tried": tried}
+            own = Finding("channel-change-ambiguous", numbers, _named(alike), severity="note", variant="equal")
+            return ChannelSearch(None, own)
+        return ChannelSearch(None, Finding("channel-names-confirmed", {"tried": tried}))
     ratios = [float(np.sqrt(one / count)) for one in (given, best)]
-    falls = f"the residual falls from {ratios[0]:.3g} to {ratios[1]:.3g} times the noise; {tried}"
+    falls = {"before": ratios[0], "after": ratios[1], "tried": tried}
     if len(alike) > 1:
-        text = f"with {_either(alike)} {falls}; the FRFs do not show which of these holds, and none was made"
-        return ChannelSearch(None, warn("channels", text, _named(alike)))
-    text = f"the fit takes {alike[0]}: {falls}; correct names or signs of the channels"
-    return ChannelSearch(alike[0], warn("channels", text, alike[0].names))
+        own = Finding("channel-change-ambiguous", falls | {"changes": _either(alike)}, _named(alike))
+        return ChannelSearch(None, own)
+    return ChannelSearch(alike[0], Finding("channel-changed", falls | {"change": str(alike[0])}, alike[0].names))
 
 
 def _either(changes: Sequence[ChannelChange]) -> str:

@@ -1,78 +1,19 @@
-"""Findings of a check of FRFs, and the corrections that it proposes."""
+"""The result of a check of FRFs, and the corrections that it proposes."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.messages.finding import Finding, messages_of
 
-__all__ = ["Correction", "FindingKind", "FindingLevel", "FrfCheck", "FrfFinding", "corrected"]
+__all__ = ["Correction", "FrfCheck", "FrfFix", "corrected"]
 
-FindingLevel = Literal["error", "warning", "note"]
-FindingKind = Literal[
-    "lines",
-    "missing",
-    "zero-frequency",
-    "reference",
-    "dead",
-    "doubled",
-    "time-convention",
-    "exchanged",
-    "quantity",
-    "sign",
-    "units",
-    "gain",
-    "delay",
-    "direction",
-    "place",
-    "reciprocity",
-    "passivity",
-    "bent",
-]
-
-
-@dataclass(frozen=True)
-class FrfFinding:
-    """One thing that is wrong with measured FRFs.
-
-    Attributes
-    ----------
-    kind : str
-        One of "lines", "missing", "zero-frequency", "reference", "dead", "doubled", "time-convention", "exchanged",
-        "quantity", "sign", "units", "gain", "delay", "direction", "place", "reciprocity", "passivity", "bent".
-    level : {"error", "warning", "note"}
-        A fit is meaningless; it is wrong by about the size found; for information.
-    channels : tuple of str
-        Names of the channels; empty where it concerns all.
-    value, threshold : float
-        The number that shows it, and the limit it exceeds (or falls below).
-    message, remedy : str
-        What it means; what to do.
-    """
-
-    kind: FindingKind
-    level: FindingLevel
-    channels: tuple[str, ...]
-    value: float
-    threshold: float
-    message: str
-    remedy: str
-
-    def __str__(self) -> str:
-        return f"{self.level}: {self.kind}: {self.message}; {self.remedy}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it for JSON; a number that is not finite becomes None."""
-        numbers = {
-            name: number if math.isfinite(number) else None
-            for name, number in (("value", self.value), ("threshold", self.threshold))
-        }
-        texts = dict(kind=self.kind, level=self.level, channels=list(self.channels))
-        return {**texts, **numbers, "message": self.message, "remedy": self.remedy}
+#: What `fix` of `check_frfs` names.
+FrfFix = Literal["lines", "time-convention", "exchanged", "quantity", "sign", "units", "gain", "delay"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +22,7 @@ class FrfCheck:
 
     Attributes
     ----------
-    findings : tuple of FrfFinding
+    findings : tuple of Finding
         Errors first, then warnings, then notes.
     freq_hz : ndarray, shape (n_freq,)
     h : ndarray, shape (n_freq, n_responses, n_forces)
@@ -92,7 +33,7 @@ class FrfCheck:
         Errors that no check of these FRFs can detect.
     """
 
-    findings: tuple[FrfFinding, ...]
+    findings: tuple[Finding, ...]
     freq_hz: FloatArray
     h: ComplexArray
     changes: tuple[str, ...]
@@ -101,12 +42,12 @@ class FrfCheck:
     @property
     def ok(self) -> bool:
         """Whether there is neither an error nor a warning."""
-        return all(finding.level == "note" for finding in self.findings)
+        return all(finding.severity == "note" for finding in self.findings)
 
     @property
-    def serious(self) -> list[str]:
-        """Errors and warnings, in words."""
-        return [str(finding) for finding in self.findings if finding.level != "note"]
+    def warnings(self) -> tuple[str, ...]:
+        """Errors and warnings, as they are printed."""
+        return messages_of(self.findings)
 
     def __str__(self) -> str:
         head = f"{self.h.shape[0]} lines, {self.h.shape[1]} responses x {self.h.shape[2]} forces"
@@ -130,8 +71,8 @@ class Correction:
 
     Attributes
     ----------
-    kind : str
-        Of the finding that it belongs to.
+    fix : str
+        The word of `fix` that asks for it.
     text : str
         What it does.
     axis : {1, 2}
@@ -143,7 +84,7 @@ class Correction:
         Whether the two places are exchanged, or all FRFs conjugated, instead.
     """
 
-    kind: FindingKind
+    fix: FrfFix
     text: str
     axis: int = 1
     places: tuple[int, ...] = ()

@@ -1,4 +1,4 @@
-"""FRFs that are bent by amplitude: a resonance that moves with the motion it has."""
+"""Amplitude-dependent FRFs: a resonance that moves with its own motion."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jointfrf.channels.check.finding import FrfFinding
 from jointfrf.channels.check.signals import LEAST_LINES, Measurement, as_measurement, check_signals
 from jointfrf.frf.bands import spread_lines
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
+from jointfrf.messages.finding import Finding
 
-__all__ = ["bent_findings", "bent_of_channels", "refuse_bent"]
+__all__ = ["amplitude_findings", "amplitude_of_channels", "refuse_amplitude"]
 
 #: Powers of 1 / (f - z) of a pole alone, and of each of two, for further ones close by; powers of f, for all others.
 _ALONE, _TOGETHER, _POWERS = 3, 2, 4
@@ -49,10 +49,10 @@ class _Peak(NamedTuple):
     span: float
 
 
-def bent_of_channels(
+def amplitude_of_channels(
     freq_hz: FloatArray, h: ComplexArray, responses: Sequence[str], forces: Sequence[str]
-) -> list[FrfFinding]:
-    """Return what `bent_findings` finds in FRFs of shape (n_freq, n_responses, n_forces), NaN where not measured.
+) -> list[Finding]:
+    """Return what `amplitude_findings` finds in FRFs of shape (n_freq, n_responses, n_forces), NaN where not measured.
 
     Dead and doubled channels are left out, and many lines thinned.
     """
@@ -61,22 +61,19 @@ def bent_of_channels(
         return []
     m = as_measurement(freq_hz[some], h[some], responses, forces, np.asarray(np.isnan(h).all(axis=0)))
     signals = check_signals(m)
-    return list(bent_findings(m, set(signals.rows), set(signals.columns)))
+    return list(amplitude_findings(m, set(signals.rows), set(signals.columns)))
 
 
-def refuse_bent(findings: Sequence[FrfFinding]) -> None:
+def refuse_amplitude(findings: Sequence[Finding]) -> None:
     """Raise ValueError where FRFs are bent by amplitude: a linear fit would describe one test, not the structure."""
-    bent = [one for one in findings if one.kind == "bent"]
+    bent = [one for one in findings if one.code == "amplitude-dependent"]
     if bent:
-        said = "; ".join(one.message for one in bent[:_DESCRIBED])
+        said = "; ".join(one.text for one in bent[:_DESCRIBED])
         more = f"; so are those of {len(bent) - _DESCRIBED} more forces" if bent[_DESCRIBED:] else ""
-        raise ValueError(
-            f"{said}{more}: no linear structure, to which a joint could be fitted; {bent[0].remedy}; accept_bent=True "
-            "fits it all the same"
-        )
+        raise ValueError(f"{said}{more}; accept_bent=True fits it all the same")
 
 
-def bent_findings(m: Measurement, rows: set[int], columns: set[int]) -> Iterator[FrfFinding]:
+def amplitude_findings(m: Measurement, rows: set[int], columns: set[int]) -> Iterator[Finding]:
     """Yield a finding for each force whose FRFs are bent, of channels that are not left out.
 
     About a resonance the FRFs of a linear structure are c_p / (f - z), with one pole z for all responses, beside powers
@@ -98,17 +95,12 @@ def bent_findings(m: Measurement, rows: set[int], columns: set[int]) -> Iterator
     bent = [one for one in found if one[2].chance * looked < _CHANCE and abs(one[2].shift) > _SHIFT]
     for column in dict.fromkeys(one[0] for one in bent):
         _, (freq, low, high), worst = min((one for one in bent if one[0] == column), key=lambda one: one[2].chance)
-        others = sum(one[0] == column for one in bent) - 1
-        more = f", and {others} more resonance{'s' * (others > 1)}" if others else ""
-        name = f"force {m.forces[column]}"
-        yield FrfFinding(
-            "bent", "warning", (name,), float(abs(worst.shift)), _SHIFT,
-            f"FRFs of {name} are bent by amplitude: the resonance at {freq:.4g} Hz ({low:.4g} to {high:.4g} Hz) moves "
-            f"by {worst.hertz.real:+.2g} Hz while the motion grows {np.exp(worst.span):.2g} times (chance of a linear "
-            f"structure {worst.chance * looked:.1g}){more}",
-            "measure at a lower level or with the motion held (response control), or leave these lines out; jointfrf "
-            "levels finds stiffness and damping over amplitude",
-        )  # fmt: skip
+        numbers = {
+            "freq": float(freq), "shift": worst.hertz.real, "growth": float(np.exp(worst.span)),
+            "chance": worst.chance * looked, "half_bandwidths": float(abs(worst.shift)),
+            "resonances": sum(one[0] == column for one in bent),
+        }  # fmt: skip
+        yield Finding("amplitude-dependent", numbers, (f"force {m.forces[column]}",), ((float(low), float(high)),))
 
 
 def _peaks(freq_hz: FloatArray, h: ComplexArray) -> Iterator[tuple[list[int], _Peak]]:
