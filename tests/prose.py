@@ -151,19 +151,17 @@ def docstring_passages(text: str, line: int) -> Iterator[Passage]:
 
 
 def python_passages(text: str) -> tuple[list[Passage], list[Passage]]:
-    """Return the docstrings of public names, and the messages: texts of what is raised, warned of or found."""
+    """Return the docstrings of public names, and the messages: texts that are raised, warned of, or in a table."""
     docstrings, messages = [], []
-    tree = ast.parse(text)
-    for node in ast.walk(tree):
+    for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
             if documented := ast.get_docstring(node):
                 docstrings += docstring_passages(documented, node.body[0].lineno)
-        elif isinstance(node, ast.Call) and re.search(r"(?:[Ww]arn|Warning|Error|Finding)$", _called(node)):
-            messages += [
-                Passage(argument.lineno, said)
-                for argument in (*node.args, *(keyword.value for keyword in node.keywords))
-                if len((said := _text_of(argument)).split()) > 2
-            ]
+        elif isinstance(node, ast.Call) and re.search(r"(?:[Ww]arn|Warning|Error|Finding|Message)$", _called(node)):
+            for argument in node.args:
+                for part in argument.values if isinstance(argument, ast.Dict) else [argument]:
+                    if len((message := _text_of(part)).split()) > 2:
+                        messages.append(Passage(part.lineno, message))
     return sorted(docstrings), sorted(messages)
 
 
@@ -174,7 +172,7 @@ def _called(call: ast.Call) -> str:
 def _text_of(node: ast.expr) -> str:
     """Return the text of a string with VALUE for each part that is known only when the program runs."""
     if isinstance(node, ast.Constant):
-        return node.value if isinstance(node.value, str) else ""
+        return re.sub(r"\{[^{}]*\}", "VALUE", node.value) if isinstance(node.value, str) else ""  # templates, too
     if isinstance(node, ast.JoinedStr):
         return "".join(_text_of(part) if isinstance(part, ast.Constant) else "VALUE" for part in node.values)
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):

@@ -113,6 +113,7 @@ def public(what):
                          "not known; use another")
     warn("what the user gave" + what + " is odd", stacklevel=2)
     print("what is printed is no message")
+    Message("note", {"": "a table of messages", "b": "{count:g} of {total} lines"}, means="what is a paragraph")
 
 
 def _private():
@@ -123,6 +124,8 @@ def _private():
     assert [text for _, text in messages] == [
         "the name VALUE is not known; use another",
         "what the user gaveVALUE is odd",
+        "a table of messages",
+        "VALUE of VALUE lines",
     ]
 
 
