@@ -162,7 +162,7 @@ def python_passages(text: str) -> tuple[list[Passage], list[Passage]]:
                 for part in argument.values if isinstance(argument, ast.Dict) else [argument]:
                     if len((message := _text_of(part)).split()) > 2:
                         messages.append(Passage(part.lineno, message))
-    return sorted(docstrings), sorted(messages)
+    return sorted(docstrings, key=lambda one: one.line), sorted(messages, key=lambda one: one.line)
 
 
 def _called(call: ast.Call) -> str:
