@@ -24,6 +24,64 @@ from jointfrf.cli.main import main
 from jointfrf.toml.declared import read_keys
 from jointfrf.toml.table import TomlTable
 
+
+@pytest.mark.parametrize(
+    ("printed", "shown", "agreed"),
+    [
+        ("k 1993.1 N/m", "k 1993.1 N/m", True),
+        ("k 1993.1 N/m", "k 1993 N/m", True),  # rounded on the page
+        ("k 1993.1 N/m", "k 1993.2 N/m", False),
+        ("k 1993 N/m", "k 1993.1 N/m", False),  # a digit that nothing printed
+        ("9.9955406E+06, (95 %)", "9.9955E+06, (95 %)", True),
+        ("9.9956406E+06, (95 %)", "9.9955E+06, (95 %)", False),
+        ("k 1993.1 N/m", "c 1993.1 N/m", False),
+        ("a\nb c\n-----\nd", "a\n...\nd", True),
+        ("a\nb c\nd", "a\n...", True),
+        ("a\nb c\nd", "...\nb\nc d", True),
+        ("a\nb c\nd", "...\nb\n...\ne", False),
+        ("a b c", "a b", False),
+        ("a b", "a b c", False),
+    ],
+)
+def test_digits_are_compared_exactly(printed, shown, agreed):
+    if agreed:
+        agree(printed, shown)
+    else:
+        with pytest.raises(AssertionError):
+            agree(printed, shown)
+
+
+def test_steps_of_a_page_are_its_blocks_and_the_commands_in_its_tables():
+    page = """
+```sh fragment
+rm everything
+```
+```text
+$ one \\
+    more
+printed
+$ two
+```
+- an item
+  ```python
+  f()
+  ```
+  ```text
+  found
+  ```
+
+| a | `jointfrf check FILE` | `jointfrf.toml` |
+"""
+    assert steps(page) == [
+        ("sh", "one \\\n    more\n", "printed\n"),
+        ("sh", "two\n", ""),
+        ("python", "f()\n", "found\n"),
+        ("sh", "jointfrf check FILE", None),
+    ]
+    with pytest.raises(AssertionError, match="belongs to no step"):
+        steps("```python\n```\n```text\na\n```\n```text\nb\n```")
+
+
 #: Pages that a newcomer follows: every block and every command in a table is a step, in the order of the page.
 WALKED = ("README.md", "docs/index.md", "docs/quickstart.md", "docs/measured-file.md")
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from decimal import Decimal
 from itertools import groupby
 from pathlib import Path
+from textwrap import dedent
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -43,7 +44,8 @@ def steps(page: str) -> list[Step]:
     """Return all steps of a page in their order: blocks that are no fragments, and the commands in tables."""
     found: list[Step] = []
     pattern = r"^ *```(\w+)\n(.*?)^ *```|^\|[^\n]*?`(jointfrf [^`\n]+)`"
-    for language, block, command in re.findall(pattern, page, re.DOTALL | re.MULTILINE):
+    for language, indented, command in re.findall(pattern, page, re.DOTALL | re.MULTILINE):
+        block = dedent(indented)
         if command:
             found.append(Step("sh", command))
         elif block.startswith("$ "):
