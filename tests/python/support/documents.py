@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from decimal import Decimal
 from itertools import groupby
@@ -57,6 +62,24 @@ def steps(page: str) -> list[Step]:
         else:
             found.append(Step(language, block))
     return found
+
+
+def follow(page: str, folder: Path) -> Iterator[tuple[Step, str]]:
+    """Do the steps of a page in a folder that has the cases, as a reader does; yield each with its output."""
+    (folder / "cases").symlink_to(ROOT / "cases")
+    environment = os.environ | {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+    named = {"__name__": "__main__"}
+    for step in steps(page):
+        with contextlib.chdir(folder), contextlib.redirect_stdout(io.StringIO()) as printed:
+            if step.language == "python":
+                exec(step.code, named)
+            else:
+                assert step.language == "sh", f"a block of {step.language} is no step"
+                command = ["sh", "-ec", step.code]
+                done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+                assert done.returncode == 0, f"{step.code}: {done.stderr}"
+                print(done.stdout, end="")
+        yield step, printed.getvalue()
 
 
 def same_word(printed: str, shown: str) -> bool:
