@@ -70,13 +70,13 @@ $ two
   found
   ```
 
-| a | `jointfrf check FILE` | `jointfrf.toml` |
+| a | `jointfrf check` | `jointfrf check cases/a.uff` | `jointfrf.toml` |
 """
     assert steps(page) == [
         ("sh", "one \\\n    more\n", "printed\n"),
         ("sh", "two\n", ""),
         ("python", "f()\n", "found\n"),
-        ("sh", "jointfrf check FILE", None),
+        ("sh", "jointfrf check cases/a.uff", None),
     ]
     with pytest.raises(AssertionError, match="belongs to no step"):
         steps("```python\n```\n```text\na\n```\n```text\nb\n```")

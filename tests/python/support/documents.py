@@ -46,9 +46,9 @@ def commands_shown(block: str) -> Iterator[Step]:
 
 
 def steps(page: str) -> list[Step]:
-    """Return all steps of a page in their order: blocks that are no fragments, and the commands in tables."""
+    """Return all steps of a page in their order: blocks that are no fragments, and commands on cases in tables."""
     found: list[Step] = []
-    pattern = r"^ *```(\w+)\n(.*?)^ *```|^\|[^\n]*?`(jointfrf [^`\n]+)`"
+    pattern = r"^ *```(\w+)\n(.*?)^ *```|^\|[^\n]*?`(jointfrf [^`\n]*cases/[^`\n]+)`"
     for language, indented, command in re.findall(pattern, page, re.DOTALL | re.MULTILINE):
         block = dedent(indented)
         if command:
