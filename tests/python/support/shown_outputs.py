@@ -1,18 +1,19 @@
 """Write the outputs that a page shows anew: python tests/python/support/shown_outputs.py docs/quickstart.md...
 
 Lines are broken to fit the site; numbers of more than nine digits are rounded to five. Of an output with lines `...`
-the lines that are shown are found by their first word, as many as before.
+each part is found by the line most like its first one, with as many lines as before.
 """
 
 import re
 import sys
 import tempfile
 import textwrap
+from difflib import SequenceMatcher
 from pathlib import Path
 
 from documents import follow
 
-WIDTH = 78
+WIDTH = 82
 
 
 def as_shown(printed: str) -> str:
@@ -31,9 +32,10 @@ def shortened(printed: str, before: str) -> str:
     """Return the parts of an output between lines `...` that a page showed before."""
     lines, text, at = printed.splitlines(), [], 0
     for part in re.split(r"^(\.\.\.)\n", before, flags=re.MULTILINE):
-        if part != "..." and (words := part.split()):
+        if part != "..." and part.strip():
             blank = len(part) - len(part.lstrip("\n"))
-            at = next(i for i in range(at, len(lines)) if lines[i].split()[:1] == words[:1]) - blank
+            first = part.lstrip("\n").partition("\n")[0]
+            at += max(range(len(lines) - at), key=lambda i: SequenceMatcher(None, lines[at:][i], first).ratio()) - blank
             wanted = part.count("\n")
             text += lines[at : at + wanted]
             at += wanted
