@@ -12,6 +12,7 @@ __all__ = [
     "CopyWarning",
     "FileContentError",
     "FileContentWarning",
+    "FrfCheckError",
     "FrfCheckWarning",
     "IdentificationWarning",
     "IllConditionedWarning",
@@ -57,6 +58,10 @@ class FileContentWarning(UserWarning):
 
     def __init__(self, message: str) -> None:
         super().__init__(visible(" ".join(message.splitlines())))
+
+
+class FrfCheckError(ValueError):
+    """Measured FRFs are not usable as they are: the quantity, a sign, the time convention; see `check_frfs`."""
 
 
 class FrfCheckWarning(UserWarning):

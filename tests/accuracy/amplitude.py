@@ -6,9 +6,10 @@ moduli are believed to 1 %, the loss factor, 0.001, to 50 %: draw i of level l, 
 that is drawn so, with the seed [7, 1000 l + i]; its noise has the seed 1000 l + i.
 
 amplitude [CONTROL...] [--draws N] [--levels NUMBER...]: joint (its relative rotation is held), response (the free end
-of B), force; alarms: linear tests that are called bent (draw i has the seed i); check: what `jf.check_frfs` calls bent,
-linear chains (seed [8, i] of chain i, i of its noise), these where as much noise of each force, common to all
-responses, comes to it (seed [9, i]), and this beam under a force held (each tenth draw another beam).
+of B), force; alarms: linear tests that `levels` rejects (draw i has the seed i); check: what `jf.check_frfs` calls
+amplitude-dependent: linear chains (seed [8, i] of chain i, i of its noise), these with as much noise of each force,
+common to all responses (seed [9, i]), and this beam under a force held (each tenth draw another beam); records: linear
+tests from time records with a Hann window, H1 and 2 to 5 averages (`time_records`, seeds from 0).
 """
 
 import argparse
@@ -24,6 +25,7 @@ import jointfrf as jf
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python" / "support"))
 
 from harmonic_balance import IwanBeam, Sliders, Steady, believed, iwan_beam
+from time_records import time_test
 
 FREQ_HZ = np.arange(180.0, 400.5, 2.0)
 CHANNELS = ["A/1:y", "A/15:y", "B/9:y", "B/25:y"]
@@ -66,7 +68,7 @@ def coverage(control: str, numbers: Iterable[int], draws: int) -> Iterator[str]:
             beam = truth(1000 * number + draw)
             steady, drive = measured(beam, control, level)
             h = jf.pollute(steady.h[:, :, None], NOISE, seed=1000 * number + draw)
-            fit = jf.identify_model(FREQ_HZ, h, believed(), CHANNELS, CHANNELS[:1], accept_bent=control == "force")
+            fit = jf.identify_model(FREQ_HZ, h, believed(), CHANNELS, CHANNELS[:1])
             try:
                 found = jf.levels([fit], [drive], laws=()).levels["theta_z"][0]
             except ValueError:
@@ -92,7 +94,7 @@ def coverage(control: str, numbers: Iterable[int], draws: int) -> Iterator[str]:
 
 
 def alarms(draws: int) -> Iterator[str]:
-    """Yield how many linear tests are called bent, for each noise: with models under a force held, and at the joint."""
+    """Yield how many linear tests are rejected, for each noise: with models under a force held, and at the joint."""
     joint = jf.LawJoint({"theta_z": jf.SpringLaw(1.1e5, h=3e3)}, ["y"], dofs=["y", "theta_z"])
     whole = believed()
     h = jf.Assembly(whole.a, whole.b, joint).receptance(FREQ_HZ, CHANNELS, CHANNELS[:1])
@@ -101,7 +103,7 @@ def alarms(draws: int) -> Iterator[str]:
     b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end").receptance(freq, [0])
     gamma = jf.couple(a, b, np.full((freq.size, 1, 1), 2000 + 100j), [0], [0])
     for noise in (0.002, 0.01, 0.05):
-        bent = [0, 0]
+        rejected = [0, 0]
         for draw in range(draws):
             fits = (
                 jf.identify_model(FREQ_HZ, jf.pollute(h, noise, seed=draw), whole, CHANNELS, CHANNELS[:1]),
@@ -111,8 +113,8 @@ def alarms(draws: int) -> Iterator[str]:
                 try:
                     jf.levels([fit], [jf.Drive("force", 1.0)], laws=())
                 except ValueError:
-                    bent[i] += 1
-        yield f"| {100 * noise:g} % | {bent[0]} of {draws} | {bent[1]} of {draws} |"
+                    rejected[i] += 1
+        yield f"| {100 * noise:g} % | {rejected[0]} of {draws} | {rejected[1]} of {draws} |"
 
 
 def chain(number: int) -> tuple[np.ndarray, np.ndarray]:
@@ -124,8 +126,8 @@ def chain(number: int) -> tuple[np.ndarray, np.ndarray]:
     return freq, own.receptance(freq)
 
 
-def bent(freq: np.ndarray, h: np.ndarray, noise: float, seed: int, of_force: float = 0.0) -> bool:
-    """Return whether FRFs with noise, and with some of each force, are called bent without models."""
+def is_dependent(freq: np.ndarray, h: np.ndarray, noise: float, seed: int, of_force: float = 0.0) -> bool:
+    """Return whether FRFs with noise, and with some of each force, are called amplitude-dependent without models."""
     own = jf.pollute(h, noise, seed=seed) if noise else h
     size = np.random.default_rng([9, seed]).normal(size=(2, len(freq), 1, h.shape[2]), scale=of_force / np.sqrt(2))
     own = own * (1 + size[0] + 1j * size[1])
@@ -135,14 +137,22 @@ def bent(freq: np.ndarray, h: np.ndarray, noise: float, seed: int, of_force: flo
 
 
 def checks(draws: int) -> Iterator[str]:
-    """Yield how many tests are called bent, for each noise: linear chains, and the beam at forces."""
+    """Yield how many tests are called amplitude-dependent, for each noise: linear chains, and the beam at forces."""
     freq, beams = np.arange(215.0, 255.0, 0.5), [truth(i) for i in range(-(-draws // 10))]
     states = {force: [beam.at_force(freq, force).h[:, :, None] for beam in beams] for force in BENDING}
     for noise in (0.0, 0.002, 0.01, 0.05):
-        linear = [sum(bent(*chain(i), noise, i, force) for i in range(4 * draws)) for force in (0.0, noise)]
-        named = [sum(bent(freq, own[i // 10], noise, i) for i in range(draws)) for own in states.values()]
+        linear = [sum(is_dependent(*chain(i), noise, i, force) for i in range(4 * draws)) for force in (0.0, noise)]
+        named = [sum(is_dependent(freq, own[i // 10], noise, i) for i in range(draws)) for own in states.values()]
         shown = " | ".join(f"{one} of {4 * draws}" for one in linear)
         yield f"| {100 * noise:g} % | {shown} | {' | '.join(map(str, named))} |"
+
+
+def records(draws: int) -> Iterator[str]:
+    """Yield how many linear tests from time records are called amplitude-dependent, by their source of motion."""
+    tests = [time_test(seed) for seed in range(draws)]
+    for word in ("impact", "random force"):
+        own = [is_dependent(one.freq_hz, one.h, 0.0, 0) for one in tests if one.source == word]
+        yield f"| {word} | {len(own)} | {sum(own)} |"
 
 
 def main() -> None:
@@ -156,6 +166,9 @@ def main() -> None:
     for control in args.controls:
         if control == "alarms":
             print("\n| noise | with models | at the joint |\n|---|---|---|", *alarms(args.draws), sep="\n")
+            continue
+        if control == "records":
+            print("\n| source | tests | called amplitude-dependent |\n|---|---|---|", *records(args.draws), sep="\n")
             continue
         if control == "check":
             heads = ["noise", "linear", "and of the force", *(f"{one:g} N" for one in BENDING)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -89,7 +89,7 @@ class MeasuredAssembly:
         lines += [f"{name}: {line}" for name, part in parts.items() for line in part.describe()]
         return lines + ([f"not used: {', '.join(self.unused)}"] if self.unused else [])
 
-    def fit(self, *, noise: float | None = None, find_wrong_channels: bool = False, accept_bent: bool = False) -> Fit:
+    def fit(self, *, noise: float | None = None, find_wrong_channels: bool = False, accept: Sequence[str] = ()) -> Fit:
         """Identify the joint, as `identify_model` does.
 
         Parameters
@@ -98,15 +98,15 @@ class MeasuredAssembly:
             Relative noise of the FRFs; found from them by default.
         find_wrong_channels : bool
             Whether to look for a channel of the opposite sign, or two exchanged ones.
-        accept_bent : bool
-            Whether FRFs that are bent by amplitude are fitted, not refused.
+        accept : sequence of str
+            Codes of errors of the data at which the fit does not stop.
         """
         coherence, averages = (None, None) if noise is not None else (self.coherence, self.averages)
         return identify_model(
             self.freq_hz, self.h, self.assembly, self.responses, self.forces, response_gains=self.response_gains,
             force_gains=self.force_gains, fixed=self.fixed, noise=noise,
             coherence=coherence, averages=averages, setups=self.setups,
-            find_wrong_channels=find_wrong_channels, accept_bent=accept_bent,
+            find_wrong_channels=find_wrong_channels, accept=accept,
         )  # fmt: skip
 
 

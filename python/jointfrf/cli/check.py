@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 
-from jointfrf.channels.check.check import check_frfs
+from jointfrf.channels.check.check import check_frfs, wrong_numbers
 from jointfrf.channels.check.result import FrfCheck
 from jointfrf.cli.measured_file import add_file_arguments, file_names, in_some_band, read_measured
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
 from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import Output
+from jointfrf.io import FrfSet
 
 __all__ = ["add_arguments", "check_joint", "run"]
 
@@ -29,14 +30,17 @@ def add_arguments(parser: CommandParser) -> None:
     add_file_arguments(parser)
 
 
-def check_joint(joint: MeasuredJoint, read_as: str) -> FrfCheck:
-    """Look at the FRFs of the channels of a joint, on the lines in its bands; they were read as some quantity."""
+def check_joint(joint: MeasuredJoint, measured: FrfSet) -> FrfCheck:
+    """Check the FRFs of the channels of a joint, on the lines in its bands, and the numbers of all FRFs of the file."""
+    wrong = wrong_numbers(measured)
+    if wrong is not None:
+        return FrfCheck((wrong,), joint.freq_hz, joint.h, (), "anything else, as long as all numbers are wrong")
     if joint.every is not None:
         channels, h = joint.every
-        return check_frfs(*in_some_band(joint.freq_hz, h, joint.bands), joint=channels, read_as=read_as)
+        return check_frfs(*in_some_band(joint.freq_hz, h, joint.bands), joint=channels, read_as=measured.quantity)
     names = joint.responses.channels, joint.forces.channels
     lines = in_some_band(joint.freq_hz, joint.h, joint.bands)
-    return check_frfs(*lines, responses=names[0], forces=names[1], read_as=read_as)
+    return check_frfs(*lines, responses=names[0], forces=names[1], read_as=measured.quantity)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -48,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     joint = None
     if any(getattr(args, name) is not None for name in _OF_JOINT):
         joint = measured_joint(args, frfs, is_look=True)
-        check = check_joint(joint, measured.quantity)
+        check = check_joint(joint, measured)
         warned = [*joint.warnings(check)]
         out.say(*joint.text(), *(f"warning: {text}" for text in warned))
         out.warn(*warned)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from jointfrf.channels.check.check import warn_of_sets
 from jointfrf.channels.virtual_point import append_virtual_point, channel_geometry, virtual_point
 from jointfrf.cli.frf import (
     CHANNEL_DIRECTIONS,
@@ -16,6 +17,7 @@ from jointfrf.cli.frf import (
     check_target,
     is_model,
     lines_of,
+    measured_sets,
     own_matrix,
     read_structures,
 )
@@ -94,6 +96,7 @@ def run(args: argparse.Namespace) -> int:
         a, b = a.select(args.band), b.select(args.band)
     b = renumbered(b, args.renumber_b, args.shift_b)
     k_side = shifted(args.k, args.renumber_b)
+    warn_of_sets(*measured_sets(args.a, a, args.b, b))
     with waiting("coupling"):
         assembly = coupled(a, b, found.joint, (args.j, k_side), args.at)
     write_frfs(args.output, assembly)

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from jointfrf.channels.check.check import warn_of_sets
 from jointfrf.cli.couple import joint_channels_of, renumbered, shifted
-from jointfrf.cli.frf import own_matrix, read_structures
+from jointfrf.cli.frf import measured_sets, own_matrix, read_structures
 from jointfrf.cli.measured_file import (
     Nodes,
     add_reading_arguments,
@@ -102,6 +103,7 @@ def run(args: argparse.Namespace) -> int:
     at = {"r": args.r, "s": s}
     unused = [f"--{point}" for point in ("r", "s") if point not in args.equation]
     warn_of_ignored(args, unused, f"equation {args.equation} does not use it")
+    warn_of_sets(*measured_sets(args.a, a, args.b, b), assembly)
     side_a = _side(a, args.j, args.dofs, args.r)
     side_b = _side(b, k, args.dofs, s)
     measured = assembly.matrix(at[args.equation[0]], at[args.equation[1]])

@@ -34,6 +34,7 @@ __all__ = [
     "frfs_of_model",
     "is_model",
     "lines_of",
+    "measured_sets",
     "own_matrix",
     "read_structures",
     "run",
@@ -263,6 +264,11 @@ def read_structures(paths: Sequence[Path], freq_hz: FloatArray | None, **options
         frfs, _ = frfs_of_model(read_model(read_toml(path)), freq_hz, None, str(path))
         found.append(replace(frfs, coordinates={}))  # which count from an end of the model
     return found
+
+
+def measured_sets(path_a: Path, a: FrfSet, path_b: Path, b: FrfSet) -> list[FrfSet]:
+    """Return the FRFs of files, without FRFs of models."""
+    return [frfs for path, frfs in ((path_a, a), (path_b, b)) if not is_model(path)]
 
 
 def own_matrix(frfs: FrfSet) -> tuple[tuple[Channel, ...], np.ndarray]:

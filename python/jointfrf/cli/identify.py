@@ -11,8 +11,7 @@ from typing import Any, get_args
 import numpy as np
 
 from jointfrf.assembly_file.side_part import SidePart, read_side
-from jointfrf.channels.check.amplitude import refuse_amplitude
-from jointfrf.channels.check.check import warn_of_frfs
+from jointfrf.channels.check.check import stop_at_errors
 from jointfrf.channels.check.result import FrfCheck
 from jointfrf.channels.point_lines import difference_error
 from jointfrf.cli.check import check_joint
@@ -29,7 +28,7 @@ from jointfrf.cli.measured_file import (
     words,
 )
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
-from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.parser import CommandParser, one_of
 from jointfrf.cli.usage import Output, UsageError, check_folder, check_out, plain, waiting, warn_of_ignored
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
@@ -43,6 +42,7 @@ from jointfrf.identification.result import Fit
 from jointfrf.identification.side_models import SideModel
 from jointfrf.io import FrfSet
 from jointfrf.laws.law_joint import LawJoint
+from jointfrf.messages.of_data import FATAL_CODES
 from jointfrf.report.fit_page import write_report
 from jointfrf.spelling import did_you_mean
 
@@ -109,8 +109,10 @@ def add_arguments(parser: CommandParser) -> None:
         "--common-gain LEVEL", "that of a gain which all FRFs share, as by one calibration of the hammer", float
     )
     parser.option(
-        "--accept-bent",
-        "fit FRFs that are bent by amplitude all the same, with a warning: they describe one test, not the structure",
+        "--accept CODE",
+        "go on in spite of an error of the data by its code, such as quantity; may be repeated",
+        one_of(FATAL_CODES),
+        repeated=True,
     )
     parser.option(
         "--window-decay SIGMA", "exponential window exp(-SIGMA t) of the test, 1/s: taken off stiffnesses", float
@@ -153,15 +155,15 @@ def run(args: argparse.Namespace) -> int:
     points = np.array(joint.responses.references)
     damping = args.damping if laws is None else "none"
     request = card_request(args, joint.dofs, damping=damping, cross=args.cross, points=points)
-    check = check_joint(joint, measured.quantity)
-    if not args.accept_bent:
-        refuse_amplitude(check.findings)
+    check = check_joint(joint, measured)
+    stop_at_errors(check.findings, args.accept or ())
     _warn(args, joint, check)
     out.say(*_heading(args, frfs, joint), *(line for side in sides for line in side.text))
     fits = []
     for method in args.method:
         with waiting(f"fit by {method}"):
-            fits.append(_fit(args, method, frfs, joint, laws, tuple(side.model for side in sides)))
+            fit = _fit(args, method, frfs, joint, laws, tuple(side.model for side in sides))
+            fits.append(fit.with_findings_of_data(check.findings))
         out.say("", fits[-1])
         out.warn(*fits[-1].warnings)
     text, written = _write_results(args, frfs, joint, fits, request)
@@ -207,8 +209,7 @@ def _check_points(args: argparse.Namespace) -> None:
 
 
 def _warn(args: argparse.Namespace, joint: MeasuredJoint, check: FrfCheck) -> None:
-    """Warn of what is wrong with the FRFs, and of options that are not used."""
-    warn_of_frfs(check, bent="compliance" not in args.method)
+    """Warn of DOFs that the joint leaves out, and of options that are not used."""
     for text in joint.warnings(check):
         warnings.warn(text, FrfCheckWarning, stacklevel=3)
     if "compliance" not in args.method:
@@ -254,7 +255,7 @@ def _content(
         "sources": [str(path) for path in args.files],
         "joint": joint.to_dict(),
         "checks": check.to_dict(),
-        "warnings": [*joint.warnings(check), *check.warnings, *(text for fit in fits for text in fit.warnings)],
+        "warnings": [*joint.warnings(check), *(text for fit in fits for text in fit.warnings)],
         "fits": [fit_to_dict(fit, lines=False) for fit in fits],
         "cards": text or None,
         "written": [str(path) for path in written],
@@ -347,7 +348,7 @@ def _of_compliance(
         **known,
         "noise": args.noise,
         "setups": setups_with_gains(args, known["setups"], joint.h.shape),
-        "accept_bent": args.accept_bent,
+        "accept": args.accept or (),
         **({"window_decay": args.window_decay} if args.window_decay is not None else {}),
         **terms,
     }

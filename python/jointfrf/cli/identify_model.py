@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from jointfrf.assembly_file.measured import MeasuredAssembly, measured_assembly
-from jointfrf.channels.check.check import check_frfs, warn_of_frfs
+from jointfrf.channels.check.check import stop_at_errors, wrong_numbers
 from jointfrf.cli.export import CardRequest, card_request, page_nodes, written_cards
-from jointfrf.cli.measured_file import file_names, read_receptances, setups_with_gains
+from jointfrf.cli.measured_file import file_names, read_measured, setups_with_gains
 from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import Output, UsageError, complain, time_left, waiting
-from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
+from jointfrf.errors import ConvergenceWarning, FileContentError, FrfCheckWarning, IdentificationWarning
 from jointfrf.files import write_file
 from jointfrf.identification.record import fit_to_dict, write_record
 from jointfrf.identification.result import Fit, columns_of
@@ -139,21 +139,24 @@ def _for_one(args: argparse.Namespace, files: list[Path], stem: str) -> argparse
 def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], list[Path]]:
     """Fit one test, write what is wanted; return the fit, its content for JSON, and what was written."""
     try:
-        frfs = read_receptances(args)
+        raw = read_measured(args)
+        frfs = raw.receptance()
     except FileContentError as error:
         hint = "; with --each every file is a test of its own" if len(args.files) > 1 else ""
         raise FileContentError(f"{error}{hint}") from error
+    wrong = wrong_numbers(raw)
+    stop_at_errors([] if wrong is None else [wrong], args.accept or ())
     measured = measured_assembly(args.model, frfs, bands=args.band)
     measured = replace(measured, setups=setups_with_gains(args, measured.setups, measured.h.shape))
     request = _request(args, measured)
-    _look_at(measured)
     if not args.each:
         out.say(*_heading(args, measured))
     with waiting(f"fit of {file_names(args)}{getattr(args, 'turn', '')}"), warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
+        warnings.simplefilter("ignore", FrfCheckWarning)
         fit = measured.fit(noise=args.noise, find_wrong_channels=args.find_wrong_channels,
-                           accept_bent=args.accept_bent)  # fmt: skip
+                           accept=args.accept or ())  # fmt: skip
     source, written, text = file_names(args), list[Path](), ""
     if not args.each:
         out.say("", fit)
@@ -231,13 +234,6 @@ def _place_of_joint(measured: MeasuredAssembly, request: CardRequest) -> list[st
     words = [", ".join(f"{x:.6g}" for x in at / own.length + 0.0) for at in places]
     j, k = request.nodes
     return [*said, f"node {j} lies at ({words[0]}), node {k} at ({words[1]}) {own.words.partition(',')[0]}"]
-
-
-def _look_at(measured: MeasuredAssembly) -> None:
-    """Warn of FRFs that look wrong."""
-    if np.isfinite(measured.h).all():
-        check = check_frfs(measured.freq_hz, measured.h, responses=measured.responses, forces=measured.forces)
-        warn_of_frfs(check)
 
 
 def _heading(args: argparse.Namespace, measured: MeasuredAssembly) -> Iterator[str]:

@@ -22,7 +22,7 @@ from jointfrf.cli.measured_file import READING, add_joint_arguments, read_recept
 from jointfrf.cli.measured_joint import measured_joint
 from jointfrf.cli.parser import CommandParser, one_of
 from jointfrf.cli.usage import Output, UsageError, check_folder, check_out, waiting, warn_of_ignored
-from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
+from jointfrf.errors import ConvergenceWarning, FileContentError, FrfCheckWarning, IdentificationWarning
 from jointfrf.extras import check_extras
 from jointfrf.files import write_file
 from jointfrf.identification.fit_data import FitData
@@ -140,7 +140,12 @@ def run(args: argparse.Namespace) -> int:
     out.say(found, *([""] if written else []), *(f"wrote {path}" for path in written))
     out.warn(*found.warnings)
     by_dof = {dof: [_by_name(one) for one in own] for dof, own in found.levels.items()}
-    out.give(about | asdict(replace(found, joints={})) | {"levels": by_dof, "written": [str(path) for path in written]})
+    out.give(
+        about
+        | asdict(replace(found, joints={}))
+        | found.content()
+        | {"levels": by_dof, "written": [str(path) for path in written]}
+    )
     return 1 if found.refused else 0
 
 
@@ -165,6 +170,7 @@ def _of_fits(args: argparse.Namespace) -> tuple[JointLevels, dict[str, Any]]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they are among the findings
         warnings.simplefilter("ignore", ConvergenceWarning)
+        warnings.simplefilter("ignore", FrfCheckWarning)
         fits = [_fit(args, *each) for each in zip(tests, drives, strict=True)]
         with waiting("motion of the joint"):
             found = levels(*zip(*fits, strict=True), labels=[one.label for one in tests], laws=_chosen(args))
@@ -284,7 +290,7 @@ def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Driv
     if args.model is not None:
         measured = measured_assembly(args.model, frfs, bands=args.band)
         with waiting(f"fit of {test.path.name}"):
-            return measured.fit(noise=args.noise, accept_bent=True), drive
+            return measured.fit(noise=args.noise), drive
     joint = measured_joint(own, frfs)
     channels = [str(one) for one in joint.responses.channels]
     if drive.held == "response" and drive.channel not in channels:
@@ -292,7 +298,7 @@ def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Driv
         raise UsageError(f"--held {drive.channel}: {test.path.name} has {', '.join(channels)} at the joint{hint}")
     with waiting(f"fit of {test.path.name}"):
         known = joint.known(frfs)
-        fit = identify(frfs.freq_hz, joint.h, joint.dofs, args.band, noise=args.noise, accept_bent=True, **known)
+        fit = identify(frfs.freq_hz, joint.h, joint.dofs, args.band, noise=args.noise, **known)
     if drive.held == "response" and isinstance(fit.data, FitData):
         drive = replace(drive, channel=fit.data.response_names[channels.index(drive.channel)])
     return fit, drive

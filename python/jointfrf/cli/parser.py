@@ -33,6 +33,10 @@ COMMANDS = {
     "study": "many realisations of a case over a design of factors: error, bias and coverage beside the bound",
     "completion": "a script that completes commands and options in bash, zsh or fish",
 }
+#: Options of earlier versions, and what there is instead.
+_REMOVED = {
+    "--accept-bent": "; amplitude-dependent FRFs are fitted with wider intervals, and --accept CODE accepts errors"
+}
 #: A value that begins like an option: -0.06,0,0
 _NEGATIVE = re.compile(r"-\.?\d")
 
@@ -131,7 +135,8 @@ class CommandParser(argparse.ArgumentParser):
                 continue
             name = _name(word)
             if name not in options:
-                self.error(f"unknown option {name}{did_you_mean(name, options)}")
+                hint = _REMOVED.get(name) or did_you_mean(name, options)
+                self.error(f"unknown option {name}{hint}")
             if name != word or options[name].nargs == 0:
                 continue
             value = next(waiting, None)

@@ -159,7 +159,13 @@ def run(args: argparse.Namespace) -> int:
     out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
     out.warn(*found.warnings)
     out.give(
-        {"model": str(args.model), **asdict(found), "assemblies": needed, "written": [str(path) for path in written]}
+        {
+            "model": str(args.model),
+            **asdict(found),
+            **found.content(),
+            "assemblies": needed,
+            "written": [str(path) for path in written],
+        }
     )
     return 0
 

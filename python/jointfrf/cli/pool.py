@@ -127,7 +127,7 @@ def run(args: argparse.Namespace) -> int:
         written.append(args.output)
     out.say(pooled, *([""] if written else []), *(f"wrote {path}" for path in written))
     out.warn(*pooled.warnings)
-    out.give({"sources": sources, **asdict(pooled), "written": [str(path) for path in written]})
+    out.give({"sources": sources, **asdict(pooled), **pooled.content(), "written": [str(path) for path in written]})
     return 0
 
 

@@ -60,7 +60,8 @@ _WORDS = tuple(
         (r"\bwindow_decay\b", "--window-decay"),
         (r"^gamma ", "gamma, the FRFs between all joint DOFs, "),
         (r"\bgive models of these to identify_model\b", "name models of these by --model"),
-        (r"\baccept_bent=True\b", "--accept-bent"),
+        (r"\bset accept=\['([\w-]+)'\]", r"say --accept \1"),
+        (r"\bset accept=\['([\w-]+)', '([\w-]+)'\]", r"say --accept \1 --accept \2"),
         (r"\(check_frfs\), at transform,", "(jointfrf check), at --at and --channels,"),
     )
 )

@@ -6,8 +6,9 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
+from jointfrf.channels.check.check import warn_of_sets
 from jointfrf.cli.couple import add_joint_arguments, coupled, renumbered, shifted
-from jointfrf.cli.frf import add_line_arguments, check_target, lines_of, read_structures
+from jointfrf.cli.frf import add_line_arguments, check_target, lines_of, measured_sets, read_structures
 from jointfrf.cli.measured_file import add_reading_arguments, reading_options
 from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import Output, UsageError, waiting
@@ -52,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
     if args.band is not None:
         a, b, measured = (each.select(args.band) for each in (a, b, measured))
     b = renumbered(b, args.renumber_b, args.shift_b)
+    warn_of_sets(*measured_sets(args.a, a, args.b, b), measured)
     with waiting("coupling"):
         assembly = coupled(a, b, found.joint, (args.j, shifted(args.k, args.renumber_b)), args.at)
     shared, unused = _shared(measured, assembly)

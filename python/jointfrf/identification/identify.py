@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf.channels.check.amplitude import amplitude_of_channels, refuse_amplitude
-from jointfrf.channels.check.check import check_frfs, warn_of_frfs
+from jointfrf.channels.check.amplitude import amplitude_of_channels, motion_of_lines
+from jointfrf.channels.check.check import as_accepted, check_frfs, stop_at_errors
 from jointfrf.channels.check.result import FrfCheck
 from jointfrf.frf.bands import spread_lines
 from jointfrf.frf.setups import SetUps
@@ -55,7 +55,7 @@ def identify(
     reciprocal: bool = True,
     window_decay: float = 0.0,
     sides: tuple[SideModel, SideModel] | None = None,
-    accept_bent: bool = False,
+    accept: Sequence[str] = (),
 ) -> Fit:
     """Identify a joint from measured FRFs of the assembly between all its joint DOFs, without models.
 
@@ -108,9 +108,9 @@ def identify(
     sides : pair of SideModel, optional
         Models of both sides j and k, free of each other, that bend between channels and joint: the FRFs are corrected
         by them first, and what is not known of the models is in weights and intervals.
-    accept_bent : bool
-        Whether FRFs that are bent by amplitude, as those of no linear structure are, are fitted all the same: a finding
-        then names them. By default they are refused.
+    accept : sequence of str
+        Codes of errors of the data at which the fit does not stop: "quantity", "driving-point-sign", ...; none by
+        default.
 
     Returns
     -------
@@ -119,7 +119,9 @@ def identify(
     Raises
     ------
     ValueError
-        Wrong shapes, names, bands; NaN or Inf in a line; FRFs that no joint fits, or that are bent by amplitude.
+        Wrong shapes, names, bands; NaN or Inf in a line; FRFs that no joint fits.
+    FrfCheckError
+        The FRFs are of another quantity, sign or time convention, and this is not accepted.
 
     Warns
     -----
@@ -128,8 +130,8 @@ def identify(
     ConvergenceWarning
         The fit did not converge.
     FrfCheckWarning
-        The FRFs look wrong (`check_frfs`): sign, quantity, gain, delay, a dead or doubled channel. Not
-        where the structure is not reciprocal.
+        The FRFs look wrong (`check_frfs`): gain, delay, a dead or doubled channel, amplitude dependence; only the last
+        is checked if the structure is not reciprocal.
 
     Notes
     -----
@@ -178,12 +180,13 @@ def identify(
         measured, dofs, bands, transform,
         NoiseOptions(noise, coherence, averages, setups=setups), options, _check_sides(sides),
     )  # fmt: skip
-    check_type("accept_bent", accept_bent, bool)
-    # Models of sides have corrected those of the problem.
+    accepted = as_accepted(accept)
+    # Models of sides have corrected the FRFs of the problem.
     raw = None if sides is None else measured.h[np.isin(measured.freq_hz, problem.freq_hz)]
-    bent = _look_at(problem, transform, raw)
-    if not accept_bent:
-        refuse_amplitude(bent)
+    of_data = _look_at(problem, transform, raw)
+    stop_at_errors(of_data, accepted)
+    if any(one.code == "amplitude-dependent" for one in of_data):
+        problem = replace(problem, motion=motion_of_lines(problem.frfs.measured))
     if joint is None:
         found = fit_springs(problem)
         fit = describe_springs(found, problem)
@@ -196,7 +199,7 @@ def identify(
         found = fit_laws(problem, joint)
         fit = describe_laws(found, joint)
     fit = replace(fit, data=compliance_data(found, problem, transform))
-    fit = fit.with_findings([*fit.findings, *bent])
+    fit = fit.with_findings([*fit.findings, *of_data])
     fit.issue_warnings()
     return fit
 
@@ -214,17 +217,18 @@ def _check_sides(sides: tuple[SideModel, SideModel] | None) -> tuple[SideModel, 
 def _look_at(
     problem: FitProblem, transform: Transform | tuple[Transform, Transform] | None, raw: ComplexArray | None
 ) -> list[Finding]:
-    """Warn of FRFs that look wrong; return what is bent by amplitude: of `raw` ones where models corrected them."""
-    h = problem.frfs.measured if raw is None else raw
+    """Return errors and warnings of the FRFs; amplitude dependence of `raw` ones if models corrected them."""
+    h, found = problem.frfs.measured if raw is None else raw, list[Finding]()
     if problem.options.reciprocal:
         transforms = None if transform is None else (problem.frfs.responses, problem.frfs.forces)
         check = _checked(MeasuredFrfs(problem.freq_hz, problem.frfs.measured), problem.dofs, transforms)
-        warn_of_frfs(check, 3)
-        if raw is None and all(one.code != "amplitude-dependent" for one in check.findings):
-            return []
+        found = [one for one in check.findings if one.severity != "note"]
+        if raw is None and all(one.code != "amplitude-dependent" for one in found):
+            return found
     # by the names of the channels
     names = channel_names(problem.frfs, problem.dofs, as_pair(transform))
-    return amplitude_of_channels(problem.freq_hz, h, *names)
+    others = [one for one in found if one.code != "amplitude-dependent"]
+    return others + amplitude_of_channels(problem.freq_hz, h, *names)
 
 
 def _checked(

@@ -9,14 +9,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.channels.check.amplitude import amplitude_of_channels, refuse_amplitude
+from jointfrf.channels.check.amplitude import motion_of_lines
+from jointfrf.channels.check.check import as_accepted, check_frfs, stop_at_errors
+from jointfrf.frf.bands import spread_lines
 from jointfrf.frf.setups import SetUps
 from jointfrf.identification.describe import describe_model
 from jointfrf.identification.identify import identify
 from jointfrf.identification.manifold.coordinates import CrossTerms
 from jointfrf.identification.model.assembly import Assembly
 from jointfrf.identification.model.channel_map import ChannelChange, find_channel_change
-from jointfrf.identification.model.fit import fit_assembly
+from jointfrf.identification.model.fit import ModelProblem, fit_assembly
 from jointfrf.identification.model.prepare import Channels, prepare_model_fit
 from jointfrf.identification.model.substructure import Unknown
 from jointfrf.identification.noise import NoiseOptions
@@ -24,8 +26,13 @@ from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_lines, as_names, check_type
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
+from jointfrf.messages.finding import Finding
+from jointfrf.messages.of_data import FATAL_CODES
 
 __all__ = ["identify_model"]
+
+#: Errors that a search for wrong channels looks for itself.
+_SOUGHT = ("driving-point-sign",)
 
 
 def identify_model(
@@ -43,7 +50,7 @@ def identify_model(
     averages: float | None = None,
     setups: SetUps | None = None,
     find_wrong_channels: bool = False,
-    accept_bent: bool = False,
+    accept: Sequence[str] = (),
 ) -> Fit:
     """Identify a joint from any measured FRFs of the assembly, given its substructures as models or FRFs.
 
@@ -75,9 +82,9 @@ def identify_model(
         Whether to look for one channel of the opposite sign, or two exchanged ones of the same quantity, with which the
         models fit the FRFs far better. A warning names what was found and that the fit takes it so; where two changes
         fit alike both are named and none is made.
-    accept_bent : bool
-        Whether FRFs that are bent by amplitude, as those of no linear structure are, are fitted all the same: a finding
-        then names them. By default they are refused; `levels` takes fits to them.
+    accept : sequence of str
+        Codes of errors of the data at which the fit does not stop: "quantity", "driving-point-sign", ...; none by
+        default.
 
     Returns
     -------
@@ -87,8 +94,9 @@ def identify_model(
     Raises
     ------
     ValueError
-        Wrong shapes or names; NaN or Inf in a line; an unknown that there is not; fewer numbers than unknowns; FRFs
-        that are bent by amplitude.
+        Wrong shapes or names; NaN or Inf in a line; an unknown that there is not; fewer numbers than unknowns.
+    FrfCheckError
+        The FRFs are of another quantity, sign or time convention, and this is not accepted.
     SingularLineError
         An undamped substructure resonates at a line.
 
@@ -98,6 +106,8 @@ def identify_model(
         The residual is more than noise, with where; a parameter is poorly determined, or a combination of them.
     ConvergenceWarning
         The fit did not converge.
+    FrfCheckWarning
+        The FRFs look wrong (`check_frfs`).
 
     Notes
     -----
@@ -140,19 +150,35 @@ def identify_model(
     channels = Channels(*named, dict(response_gains or {}), dict(force_gains or {}))
     known = NoiseOptions(noise, coherence, averages, setups=setups)
     problem = prepare_model_fit(freq_hz, h, assembly, channels, known, fixed, _springs_at_joint)
-    check_type("accept_bent", accept_bent, bool)
-    bent = amplitude_of_channels(problem.freq_hz, problem.measured, channels.responses, channels.forces)
-    if not accept_bent:
-        refuse_amplitude(bent)
+    of_data = _look_at(problem, channels)
+    stop_at_errors(of_data, [*as_accepted(accept), *(_SOUGHT if find_wrong_channels else ())])
+    if any(one.code == "amplitude-dependent" for one in of_data):
+        problem = replace(problem, motion=motion_of_lines(problem.measured))
     search = find_channel_change(problem, channels) if find_wrong_channels else None
     if search is not None and search.change is not None:
         lines = search.change.of(as_lines("h", h))
         known = _changed(known, search.change)
+        motion = problem.motion
         problem = prepare_model_fit(freq_hz, lines, assembly, channels, known, fixed, _springs_at_joint)
+        problem = replace(problem, motion=motion)
     fit = describe_model(fit_assembly(problem), channels)
-    fit = fit.with_findings([*fit.findings, *([] if search is None else [search.finding]), *bent])
+    fit = fit.with_findings([*fit.findings, *([] if search is None else [search.finding]), *of_data])
     fit.issue_warnings()
     return fit
+
+
+def _look_at(problem: ModelProblem, channels: Channels) -> list[Finding]:
+    """Return errors and warnings of the FRFs, but for gains that are unknowns of the fit."""
+    some = spread_lines(problem.freq_hz.size)
+    check = check_frfs(
+        problem.freq_hz[some], problem.measured[some], responses=channels.responses, forces=channels.forces
+    )
+    unknown = {*channels.response_gains, *channels.force_gains}
+    return [
+        one for one in check.findings
+        if one.severity != "note" and one.code != "missing-frf"
+        and not (one.code in ("channel-gain", "channel-unit") and unknown & {*one.about})
+    ]  # fmt: skip
 
 
 def _changed(known: NoiseOptions, change: ChannelChange) -> NoiseOptions:
@@ -185,7 +211,7 @@ def _springs_at_joint(
         warnings.simplefilter("ignore")
         try:
             found = identify(
-                freq_hz, gamma, joint.dofs, damping="viscous", cross=cross, noise=variance, accept_bent=True
+                freq_hz, gamma, joint.dofs, damping="viscous", cross=cross, noise=variance, accept=FATAL_CODES
             )
         except (ValueError, np.linalg.LinAlgError):
             return None

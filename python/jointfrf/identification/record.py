@@ -127,7 +127,7 @@ def fit_to_dict(fit: Fit, *, probabilities: Sequence[float] | None = None, lines
         "n_lines": int(fit.freq_hz.size),
         "lines_hz": _plain_lines(fit.freq_hz),
         "bands_hz": {d: [list(b) for b in own] for d, own in zip(fit.dofs, fit.bands, strict=False)},
-        "findings": [one.to_dict() for one in fit.findings],
+        **fit.content(),
         "warnings": list(fit.warnings),
         "notes": list(fit.notes),
     }

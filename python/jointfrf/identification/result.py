@@ -23,6 +23,7 @@ from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_probability, one_line
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.messages.finding import Finding, WithFindings, as_warning, worst_first
+from jointfrf.messages.of_data import DATA_MESSAGES
 
 __all__ = [
     "Fit",
@@ -372,6 +373,11 @@ class Fit(WithFindings):
     def with_findings(self, findings: Sequence[Finding]) -> Fit:
         """Return the same fit with other findings, the worst first."""
         return replace(self, findings=worst_first(findings))
+
+    def with_findings_of_data(self, findings: Sequence[Finding]) -> Fit:
+        """Return the same fit with findings of another check of its FRFs, which knows the channels better."""
+        of_fit = [one for one in self.findings if one.code not in DATA_MESSAGES]
+        return self.with_findings([*of_fit, *(one for one in findings if one.severity != "note")])
 
     def issue_warnings(self) -> None:
         """Issue what is in doubt as warnings of Python, at the caller of the public function that fitted."""

@@ -93,6 +93,15 @@ class Spread(NamedTuple):
     factor: FloatArray
     chance: FloatArray
 
+    def between_amplitudes(self, parts: Scatter) -> Spread:
+        """Return factors that add the variance between lines of different motion, each amplitude being as good.
+
+        The scatter is of the mean of the parts: the variance of one of them is larger by their number, degrees of
+        freedom + 1, and noise alone makes it as large as that of the noise.
+        """
+        between = (parts.degrees + 1) * np.maximum(parts.factor - self.information, 0)
+        return self._replace(factor=self.factor + np.nan_to_num(between))
+
 
 def scatter_of(whole: FloatArray, pieces: Iterable[LineParts]) -> tuple[FloatArray, FloatArray]:
     """Return the variance that the gradients of parts show, and its degrees of freedom, shape (p,) each.

@@ -163,6 +163,10 @@ class WithFindings:
         """How the numbers were found."""
         return tuple(one.message for one in self.findings if one.severity == "note")
 
+    def content(self) -> dict[str, list[dict[str, Any]]]:
+        """Return the findings for JSON."""
+        return {"findings": [one.to_dict() for one in self.findings]}
+
 
 def messages_of(findings: Iterable[Finding], test: str = "") -> tuple[str, ...]:
     """Return errors and warnings as they are printed, of a test of this name."""

@@ -10,7 +10,7 @@ from jointfrf.messages.message import Message
 __all__ = ["DATA_MESSAGES", "FATAL_CODES"]
 
 #: Errors with which no fit is meaningful: `identify` stops, unless they are accepted.
-FATAL_CODES: Final = ("quantity", "driving-point-sign", "time-convention")
+FATAL_CODES: Final = ("quantity", "driving-point-sign", "time-convention", "phase-unit", "unsigned-phase", "decibel")
 
 #: How far a channel is from the rigid motion of its neighbours.
 _DIFFERS = "it differs by {error:.3p} from the rigid motion of {neighbours} neighbours, which agree to {rest:.2p}"
@@ -81,6 +81,30 @@ DATA_MESSAGES: Final[Mapping[str, Message]] = {
         "displacement there.",
         why="The reference point was mistyped, or channels of another place were chosen.",
         do="Put the reference point (`--at`) at the joint, and choose channels around it.",
+    ),
+    "phase-unit": Message(
+        "error",
+        "all phases lie within +-{largest:.4g} degrees, so they are probably radians",
+        "Read the phases as radians, or accept them (--accept phase-unit)",
+        means="All phases are so small that the FRFs look real. They were probably radians, read as degrees.",
+        why="The heading of the file states degrees, or no unit, for phases in radians.",
+        do="State `rad` in the heading of the phase column. If your FRFs are really almost real, accept the finding.",
+    ),
+    "decibel": Message(
+        "error",
+        "magnitudes from {low:.3g} to {high:.3g} hardly change while phases turn, so they are probably decibels",
+        "Convert them to linear magnitudes, or state dB in the heading",
+        means="The magnitudes change far less over frequency than magnitudes of FRFs do.",
+        why="Magnitudes in decibels were read as linear magnitudes.",
+        do="State `dB` with its reference in the heading, or export linear magnitudes.",
+    ),
+    "unsigned-phase": Message(
+        "error",
+        "all phases have one sign, yet FRFs turn both ways: the sign of the phases is lost",
+        "Export the phases with their sign, or real and imaginary parts",
+        means="FRFs between different DOFs have phases of both signs. These FRFs have phases of one sign only.",
+        why="The program that wrote the file plots the absolute value of the phase.",
+        do="Export phases from -180 to 180 degrees, or real and imaginary parts. No correction is possible afterwards.",
     ),
     "quantity": Message(
         "error",

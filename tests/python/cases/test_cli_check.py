@@ -42,11 +42,24 @@ def test_an_error_is_named_with_its_channel(wrong, words):
     assert line.endswith("[driving-point-sign]")
 
 
-def test_identify_says_it_too(wrong):
-    result = run_command("identify", wrong, *JOINT_OF_BARS)
-    said = [line for line in result.stderr.splitlines() if "the response 102:+y points" in line]
-    assert len(said) == 1
-    assert said[0].startswith("jointfrf: warning:")
+def test_identify_stops_at_it_unless_it_is_accepted(wrong, tmp_path):
+    words = ["identify", wrong, *JOINT_OF_BARS, "--save", tmp_path / "joint.json"]
+    result = run_command(*words)
+    assert (result.returncode, result.stdout) == (1, "")
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("jointfrf: error: the response 102:+y points")
+    assert line.endswith("say --accept driving-point-sign [driving-point-sign]")
+    assert not (tmp_path / "joint.json").exists()
+    assert run_command(*words, "--accept", "sign").returncode == 2
+    frfs = read_uff(BARS)
+    write_uff(wrong, replace(frfs, h=frfs.h.conj()))
+    stopped = run_command(*words)
+    assert stopped.returncode == 1
+    assert stopped.stderr.endswith("[time-convention]\n")
+    accepted = run_command(*words, "--accept", "time-convention", "--json")
+    assert accepted.returncode == 0, accepted.stderr
+    for content in (json.loads(accepted.stdout)["fits"][0], json.loads((tmp_path / "joint.json").read_text())):
+        assert content["findings"][0]["code"] == "time-convention"
 
 
 def test_frfs_that_are_missing(tmp_path):

@@ -271,7 +271,7 @@ def test_warnings_text_and_dictionary_say_the_same():
     check = jf.check_frfs(S.freq, h, NAMES)
     (finding,) = check.findings
     with pytest.warns(jf.FrfCheckWarning, match=r"the response j:Fy points against its force.*\[driving-point-sign\]$"):
-        warn_of_frfs(check)
+        warn_of_frfs(check.findings)
     assert not check.ok
     assert str(finding) in str(check)
     content = json.loads(json.dumps(check.to_dict(), allow_nan=False))
@@ -282,12 +282,14 @@ def test_warnings_text_and_dictionary_say_the_same():
 
 def test_identify_looks_first(beams):
     h = jf.pollute(beams.gamma(beams.joint), 0.01, seed=3)
+    with pytest.raises(jf.FrfCheckError, match=r"exp\(-i w t\).*\[time-convention\]$"):
+        jf.identify(beams.freq, h.conj(), ["y", "theta"])
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        jf.identify(beams.freq, h.conj(), ["y", "theta"])
+        fit = jf.identify(beams.freq, h.conj(), ["y", "theta"], accept=["time-convention"])
     said = [str(w.message) for w in caught if w.category is jf.FrfCheckWarning]
+    assert said == [one.message for one in fit.findings if one.code == "time-convention"]
     assert len(said) == 1
-    assert "exp(-i w t)" in said[0]
 
 
 @pytest.mark.parametrize(

@@ -34,18 +34,18 @@ JOINTS = {
 
 
 @pytest.mark.parametrize(
-    ("limits", "text"),
+    ("limits", "code"),
     [
-        ((1e5, 4e5), "k_y: poorly determined by the data, 95 % interval 1e+05 .. 4e+05 N/m"),
+        ((1e5, 4e5), "poorly-determined"),
         ((1.1e5, 2.9e5), ""),
-        ((1e5, np.inf), "k_y: cannot be distinguished from rigid; at least 1e+05 N/m (95 %)"),
-        ((0.0, 4e5), "k_y: cannot be distinguished from zero; at most 4e+05 N/m (95 %)"),
+        ((1e5, np.inf), "stiffness-unbounded"),
+        ((0.0, 4e5), "stiffness-zero"),
     ],
 )
-def test_parameters_that_the_data_do_not_determine(limits, text):
+def test_parameters_that_the_data_do_not_determine(limits, code):
     fit = jf.Fit.of_springs("model", ("y",), {"k_y": 2e5}, np.array([[25e8]]), 0.01, 0.01, FREQ)
-    found = [str(one) for one in poor_laws(fit, {"k_y": True}, lambda name: limits)]
-    assert found == ([text] if text else [])
+    found = [one.code for one in poor_laws(fit, {"k_y": True}, lambda name: limits)]
+    assert found == ([code] if code else [])
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from jointfrf.frf.bands import spread_lines
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.messages.finding import Finding
 
-__all__ = ["amplitude_findings", "amplitude_of_channels", "refuse_amplitude"]
+__all__ = ["amplitude_findings", "amplitude_of_channels", "motion_of_lines"]
 
 #: Powers of 1 / (f - z) of a pole alone, and of each of two, for further ones close by; powers of f, for all others.
 _ALONE, _TOGETHER, _POWERS = 3, 2, 4
@@ -26,18 +26,19 @@ _PEAKS, _RESPONSES, _LEAST = 10, 8, 3
 #: Steps of the search for the pole, and change, in halves of the band of the peak, at which it is found: it is of third
 #: order in what the further powers leave.
 _STEPS, _FOUND = 15, 1e-4
-#: Chance, divided by the number of peaks, and shift in half bandwidths from which a resonance is called bent: less
-#: hardly changes the FRF, other modes that the powers do not quite describe reach 0.1, and 2 % of noise of the force
-#: that goes on over five lines 0.7.
-_CHANCE, _SHIFT = 1e-4, 0.75
+#: Significance level, divided by the number of peaks, and shift in half bandwidths from which a resonance counts as
+#: amplitude-dependent: less hardly changes the FRF, other modes that the powers do not quite describe reach 0.1, and
+#: 2 % of noise of the force that goes on over five lines 0.7.
+_CHANCE, _SHIFT = 1e-7, 0.75
+#: Least half-power bandwidth in lines, twice that of a Hann window: the leakage of a narrower resonance moves all
+#: responses of a force alike.
+_LEAST_WIDTH = 2 * 1.44
 #: Powers of ln a, and of 1 / (f - z), that a pole has beside those of first order where it moves far.
 _FURTHER = ((2, 2), (2, 3), (3, 2), (3, 4))
 #: Chance below which responses agree on the shift: noise that goes on over many lines is not common to all.
 _AGREE = 1e-3
 #: Lines whose residual is so many times the median are left out: of noise one in 10^15 is.
 _OUTLYING = 6.0
-#: Forces whose FRFs are described where a fit is refused.
-_DESCRIBED = 2
 
 
 class _Peak(NamedTuple):
@@ -64,17 +65,16 @@ def amplitude_of_channels(
     return list(amplitude_findings(m, set(signals.rows), set(signals.columns)))
 
 
-def refuse_amplitude(findings: Sequence[Finding]) -> None:
-    """Raise ValueError where FRFs are bent by amplitude: a linear fit would describe one test, not the structure."""
-    bent = [one for one in findings if one.code == "amplitude-dependent"]
-    if bent:
-        said = "; ".join(one.text for one in bent[:_DESCRIBED])
-        more = f"; so are those of {len(bent) - _DESCRIBED} more forces" if bent[_DESCRIBED:] else ""
-        raise ValueError(f"{said}{more}; accept_bent=True fits it all the same")
+def motion_of_lines(h: ComplexArray) -> FloatArray:
+    """Return the size of the motion on each line: root mean square of FRFs over their medians, NaN left out."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        relative = abs(h) / np.median(abs(h), axis=0)
+    known = np.isfinite(relative).all(axis=0)
+    return np.sqrt(np.mean(relative[:, known] ** 2, axis=1)) if known.any() else np.ones(len(h))
 
 
 def amplitude_findings(m: Measurement, rows: set[int], columns: set[int]) -> Iterator[Finding]:
-    """Yield a finding for each force whose FRFs are bent, of channels that are not left out.
+    """Yield a finding for each force whose FRFs depend on amplitude, of channels that are not left out.
 
     About a resonance the FRFs of a linear structure are c_p / (f - z), with one pole z for all responses, beside powers
     of f and further ones of 1 / (f - z). A joint that depends on amplitude makes the pole z + g ln a, a the motion on
@@ -92,13 +92,13 @@ def amplitude_findings(m: Measurement, rows: set[int], columns: set[int]) -> Ite
         for lines, peak in _peaks(m.freq_hz, m.h[:, kept, column])
     ]
     looked = len(found)
-    bent = [one for one in found if one[2].chance * looked < _CHANCE and abs(one[2].shift) > _SHIFT]
-    for column in dict.fromkeys(one[0] for one in bent):
-        _, (freq, low, high), worst = min((one for one in bent if one[0] == column), key=lambda one: one[2].chance)
+    moving = [one for one in found if one[2].chance * looked < _CHANCE and abs(one[2].shift) > _SHIFT]
+    for column in dict.fromkeys(one[0] for one in moving):
+        _, (freq, low, high), worst = min((one for one in moving if one[0] == column), key=lambda one: one[2].chance)
         numbers = {
             "freq": float(freq), "shift": worst.hertz.real, "growth": float(np.exp(worst.span)),
             "chance": worst.chance * looked, "half_bandwidths": float(abs(worst.shift)),
-            "resonances": sum(one[0] == column for one in bent),
+            "resonances": sum(one[0] == column for one in moving),
         }  # fmt: skip
         yield Finding("amplitude-dependent", numbers, (f"force {m.forces[column]}",), ((float(low), float(high)),))
 
@@ -148,8 +148,8 @@ def _look(freq_hz: FloatArray, h: ComplexArray) -> _Peak | None:
     size = np.linalg.norm(h, axis=1)
     width = max(float(np.ptp(x[size > size.max() / np.sqrt(2)])) / 2, float(x[1] - x[0]))
     alone = _poles(x, h, np.array([x[np.argmax(size)] + 1j * width]))
-    if alone is None or 2 * alone[0][0].imag < x[1] - x[0]:
-        return None  # narrower than the lines are apart: one line is the peak, and its noise is all of it
+    if alone is None or 2 * alone[0][0].imag < _LEAST_WIDTH * (x[1] - x[0]):
+        return None
     one, left = _moved(x, h, *alone, _ALONE)
     size = np.linalg.norm(left, axis=1)
     usual = size < _OUTLYING * np.median(size)
@@ -157,7 +157,7 @@ def _look(freq_hz: FloatArray, h: ComplexArray) -> _Peak | None:
         x, h = x[usual], h[usual]
         one, left = _moved(x, h, *alone, _ALONE)
     if one.chance < _CHANCE and abs(one.shift) > _SHIFT:
-        # Two resonances, so close that there is one peak, look bent to a single pole.
+        # Two resonances, so close that there is one peak, look like one that moves.
         second = x[np.argmax(np.linalg.norm(left, axis=1))] + 1j * alone[0][0].imag
         both = _poles(x, h, np.array([alone[0][0], second]))
         if both is not None:

@@ -38,6 +38,7 @@ from jointfrf.channels.check.exchange import (
     hidden_exchange,
 )
 from jointfrf.channels.check.pair_ratios import PairRatios, pair_ratios
+from jointfrf.channels.check.representation import representation_finding
 from jointfrf.channels.check.result import Correction, FrfCheck, FrfFix, corrected
 from jointfrf.channels.check.rigid_findings import rigid_faults
 from jointfrf.channels.check.rigid_motion import ChannelGroup, not_rigid
@@ -51,8 +52,9 @@ from jointfrf.channels.check.signals import (
     find_bad_lines,
 )
 from jointfrf.channels.joint_channels import JointChannels
-from jointfrf.errors import FileContentError
-from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel
+from jointfrf.errors import FileContentError, FrfCheckError
+from jointfrf.frf.bands import spread_lines
+from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
 from jointfrf.kernel.arguments import (
     ComplexArray,
     FloatArray,
@@ -62,13 +64,18 @@ from jointfrf.kernel.arguments import (
     as_real,
     check_choice,
     check_type,
+    one_line,
 )
 from jointfrf.messages.finding import Finding, as_warning, worst_first
+from jointfrf.messages.of_data import FATAL_CODES
+from jointfrf.spelling import some_of
 
-__all__ = ["check_frfs", "warn_of_frfs"]
+__all__ = ["as_accepted", "check_frfs", "stop_at_errors", "warn_of_frfs", "warn_of_sets", "wrong_numbers"]
 
 #: Share of FRFs that run backwards from which all are conjugated.
 _BACKWARDS = 0.8
+#: Errors that the message of a fit that stops repeats.
+_STOPPED = 2
 #: Relative noise of channels that may hide small FRFs of joint DOFs, which are differences of large ones.
 _HIDING = 0.05
 
@@ -177,7 +184,11 @@ def check_frfs(
     measurement = as_measurement(freq[good], lines[good], rows, columns, missing)
     state = _Progress(measurement, 1 if blame == "responses" else 2, read_as)
     state.findings.extend([*_missing_findings(missing, joint, *labels), *found])
-    if measurement.freq_hz.size >= LEAST_LINES and measurement.h.size:
+    is_enough = measurement.freq_hz.size >= LEAST_LINES and measurement.h.size > 0
+    wrong = representation_finding(measurement, read_as) if is_enough else None
+    if wrong is not None:
+        state.findings.append(wrong)  # every other check would find consequences of it
+    elif is_enough:
         _check_signals(state)
         unspoilt = None
         if joint is not None:
@@ -193,11 +204,48 @@ def check_frfs(
     return _result(state, freq, lines, good, fix)
 
 
-def warn_of_frfs(check: FrfCheck, stacklevel: int = 2, *, bent: bool = False) -> None:
-    """Issue a `FrfCheckWarning` for each error and warning of a check; of bent FRFs, which fits refuse, if asked."""
-    for finding in check.findings:
-        if finding.severity != "note" and (bent or finding.code != "amplitude-dependent"):
+def warn_of_frfs(findings: Iterable[Finding], stacklevel: int = 2) -> None:
+    """Issue a `FrfCheckWarning` for each error and warning."""
+    for finding in findings:
+        if finding.severity != "note":
             warnings.warn(as_warning(finding), stacklevel=stacklevel + 1)
+
+
+def warn_of_sets(*sets: FrfSet, stacklevel: int = 2) -> None:
+    """Check all channels of each set of FRFs, and issue a `FrfCheckWarning` for each error and warning."""
+    for frfs in sets:
+        some, lines = spread_lines(frfs.freq_hz.size), frfs.receptance()
+        check = check_frfs(lines.freq_hz[some], lines.h[some], responses=lines.responses, forces=lines.excitations,
+                           read_as=frfs.quantity)  # fmt: skip
+        test = frfs.source if len(sets) > 1 else ""
+        warn_of_frfs([replace(one, test=test) for one in check.findings], stacklevel + 1)
+
+
+def wrong_numbers(frfs: FrfSet) -> Finding | None:
+    """Return what is wrong with all magnitudes or phases of a set: units that were not the stated ones."""
+    lines = frfs.receptance()
+    missing = np.asarray(np.isnan(lines.h).all(axis=0))
+    good = np.isfinite(lines.h[:, ~missing]).all(axis=1) & (lines.freq_hz > 0)
+    m = as_measurement(lines.freq_hz[good], lines.h[good], lines.responses, lines.excitations, missing)
+    return representation_finding(m, frfs.quantity) if np.count_nonzero(good) >= LEAST_LINES else None
+
+
+def as_accepted(accept: Sequence[str]) -> tuple[str, ...]:
+    """Check the codes of findings at which a fit does not stop."""
+    codes = as_names("accept", accept)
+    for code in codes:
+        if code not in FATAL_CODES:
+            raise ValueError(f"unknown code {one_line(code)} in accept; use one of {', '.join(FATAL_CODES)}")
+    return codes
+
+
+def stop_at_errors(findings: Iterable[Finding], accept: Sequence[str] = ()) -> None:
+    """Raise FrfCheckError for errors with which no fit is meaningful, unless their codes are accepted."""
+    fatal = [one for one in findings if one.severity == "error" and one.code in FATAL_CODES and one.code not in accept]
+    if fatal:
+        codes = list(dict.fromkeys(one.code for one in fatal))
+        texts = some_of([one.text for one in fatal], _STOPPED, "; ")
+        raise FrfCheckError(f"{texts}. To fit nevertheless, set accept={codes} [{', '.join(codes)}]")
 
 
 @dataclass

@@ -263,7 +263,9 @@ def fit_laws(problem: FitProblem, joint: LawJoint) -> ManifoldFit:
         problem, found, _ = _estimated(problem, fit)
         inflation = problem.noise.inflation
         calibration = joint_calibration(found, problem.frfs, problem.freq_hz, problem.noise.calibration)
-        spread = spread_of(found, inflation, calibration, is_level_known=not problem.noise.is_assumed)
+        spread = spread_of(
+            found, inflation, calibration, is_level_known=not problem.noise.is_assumed, motion=problem.motion
+        )
         test = residual_test_of(found, problem.freq_hz, inflation, spread, calibration)
     sides = side_spread(found, problem.frfs, None)
     root = np.sqrt(spread.factor if sides is None else spread.factor + sides.factor)
@@ -292,7 +294,7 @@ def uncertainty_of(problem: FitProblem, found: JointEstimate, choices: tuple[Dof
     noise = problem.noise
     with _quiet():
         calibration = joint_calibration(found, problem.frfs, problem.freq_hz, noise.calibration)
-    spread = spread_of(found, noise.inflation, calibration, is_level_known=not noise.is_assumed)
+    spread = spread_of(found, noise.inflation, calibration, is_level_known=not noise.is_assumed, motion=problem.motion)
     sides = side_spread(found, problem.frfs, problem.added_compliance)
     parts = _band_parts(problem, found, spread, choices)
     added = [one.std_error for one in (sides, parts) if one is not None]

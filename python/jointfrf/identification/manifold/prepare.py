@@ -94,6 +94,8 @@ class FitProblem:
         What of the models of the sides may be off, where models correct the FRFs.
     left_out : tuple of LeftOutDof
         DOFs that are not sought, but whose motion the channels take for one that is.
+    motion : ndarray, shape (n_freq,), optional
+        Size of the motion on each line, if the FRFs depend on amplitude.
     """
 
     dofs: tuple[str, ...]
@@ -109,6 +111,7 @@ class FitProblem:
     added_compliance: FloatArray | None = None
     model_errors: tuple[str, ...] | None = None
     left_out: tuple[LeftOutDof, ...] = ()
+    motion: FloatArray | None = None
 
     @property
     def sides_bend(self) -> bool:

@@ -59,8 +59,12 @@ def line_scatter(group: GroupFit) -> tuple[FloatArray, FloatArray]:
     return scatter_of(group.information, (group.of_lines(own) for own in pieces))
 
 
-def block_scatter(group: GroupFit, blocks: int = BLOCKS) -> tuple[FloatArray, FloatArray]:
+def block_scatter(
+    group: GroupFit, blocks: int = BLOCKS, motion: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
     """Variance of the coordinates of a group from the scatter between parts of the band, and its degrees of freedom.
+
+    With `motion`, shape (n_freq,), the parts are lines of similar motion instead.
 
     Returns
     -------
@@ -78,6 +82,8 @@ def block_scatter(group: GroupFit, blocks: int = BLOCKS) -> tuple[FloatArray, Fl
     lines = np.flatnonzero(group.used & diagonal.any(axis=1))
     if lines.size < 2 * blocks:
         return np.full(p, np.nan), np.zeros(p)
+    if motion is not None:
+        lines = lines[np.argsort(motion[lines], kind="stable")]
     size = np.maximum(np.diagonal(group.information), TINY)
     member = block_members(diagonal / size, lines, blocks)
     found = group.of_groups(member)
@@ -85,7 +91,12 @@ def block_scatter(group: GroupFit, blocks: int = BLOCKS) -> tuple[FloatArray, Fl
 
 
 def spread_of(
-    found: JointEstimate, inflation: float, calibration: JointCalibration | None = None, *, is_level_known: bool = True
+    found: JointEstimate,
+    inflation: float,
+    calibration: JointCalibration | None = None,
+    *,
+    is_level_known: bool = True,
+    motion: FloatArray | None = None,
 ) -> Spread:
     """Return by how much the variance of each parameter exceeds that from independent noise, as `spread_of_scatters`.
 
@@ -98,6 +109,8 @@ def spread_of(
         What smooth errors add: the residual and the scatter between blocks are compared with noise and these together.
     is_level_known : bool
         Whether the noise is known; otherwise its level is that of the residual.
+    motion : ndarray, shape (n_freq,), optional
+        Size of the motion on each line, if the FRFs depend on amplitude.
     """
     excess, beside = (0.0, 0.0) if calibration is None else (calibration.excess, calibration.factor)
     scale = max(found.scale / (1 + excess), 1.0) if is_level_known else found.scale
@@ -111,7 +124,17 @@ def spread_of(
             with np.errstate(divide="ignore", invalid="ignore"):
                 both.factor[group.which] = np.where(own > 0, more * variance / own, np.nan)
             both.degrees[group.which] = degrees / more
-    return spread_of_scatters(by_noise, lines, blocks, beside=beside)
+    spread = spread_of_scatters(by_noise, lines, blocks, beside=beside)
+    if motion is None:
+        return spread
+    between = Scatter.none(by_noise.size)
+    for group in found.groups:
+        variance, degrees = block_scatter(group, motion=motion)
+        own = np.diagonal(group.covariance)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            between.factor[group.which] = np.where(own > 0, variance / own, np.nan)
+        between.degrees[group.which] = degrees
+    return spread.between_amplitudes(between)
 
 
 def joint_intervals(found: JointEstimate, factor: FloatArray, added: FloatArray | None = None) -> Intervals:

@@ -89,6 +89,8 @@ class ModelProblem:
     shared : ndarray, shape (n_freq, n_o, n_i, n_sources), optional
         What noise of FRFs of the substructures does to those of the assembly near the minimum, m/N: as large as it
         counts over lines that are correlated.
+    motion : ndarray, shape (n_freq,), optional
+        Size of the motion on each line, if the FRFs depend on amplitude.
     """
 
     prediction: Prediction
@@ -102,6 +104,7 @@ class ModelProblem:
     compliance_start: Callable[[], FloatArray | None]
     tested: FloatArray | None = None
     shared: ComplexArray | None = None
+    motion: FloatArray | None = None
 
     @property
     def likelihood(self) -> Likelihood:
@@ -343,7 +346,8 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
     calibration = None if errors is None else gradient.calibration(errors, problem.freq_hz)
     with np.errstate(divide="ignore", invalid="ignore"):
         beside = 0.0 if calibration is None else np.nan_to_num(np.diagonal(calibration.covariance) / np.diagonal(own))
-    spread = gradient.spread(max(1.0, with_error.ratio**2) if with_error.is_large else 1.0, beside)
+    by_noise = max(1.0, with_error.ratio**2) if with_error.is_large else 1.0
+    spread = gradient.spread(by_noise, beside, problem.motion)
     root, factor = np.sqrt(spread.factor), spread.factor
     covariance = own * np.outer(root, root)
     if calibration is not None:

@@ -76,7 +76,8 @@ class FoundMotion:
         own = joint_vector(joint, fixed, prediction.joint_stiffness()).all
         rest = [one for one in vector.all if one.origin != "joint"]
         return self._describe(
-            fit_assembly(replace(problem, prediction=prediction, vector=ParameterVector((*own, *rest))))
+            # the joint follows its amplitude now
+            fit_assembly(replace(problem, prediction=prediction, vector=ParameterVector((*own, *rest)), motion=None))
         )
 
     def __call__(self) -> JointMotion:

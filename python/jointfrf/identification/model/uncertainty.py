@@ -104,7 +104,7 @@ class ModelGradient:
         information = np.concatenate([flat @ flat.swapaxes(1, 2), self.priors.information])
         return LineParts(gradient[:, self.held], information[:, self.held][:, :, self.held])
 
-    def spread(self, by_noise: float, beside: FloatArray | float = 0.0) -> Spread:
+    def spread(self, by_noise: float, beside: FloatArray | float = 0.0, motion: FloatArray | None = None) -> Spread:
         """Return variance factors by the scatter between lines, blocks, responses and forces.
 
         Parameters
@@ -113,21 +113,29 @@ class ModelGradient:
             Variance factor by the residual.
         beside : ndarray, shape (p,)
             Variance that smooth errors of channels add, likewise.
+        motion : ndarray, shape (n_freq,), optional
+            Size of the motion on each line, if the FRFs depend on amplitude.
         """
         _, n_freq, n_o, n_i = self.slopes.shape
         lines = self._parts(1)
-        of_lines, of_blocks = self._scatter(lines, self.inflation), Scatter.none(len(self.slopes))
+        of_lines, of_blocks, between = self._scatter(lines, self.inflation), *(Scatter.none(len(self.slopes)),) * 2
         share = np.einsum("lpp->lp", lines.information[:n_freq]) / np.diagonal(self._of_held)
         seen = np.flatnonzero(share.any(axis=1))
         if seen.size >= 2 * BLOCKS:
-            member = block_members(share, seen)
-            n_priors = len(self.priors.gradient)
-            whole = np.zeros((len(member) + n_priors, n_freq + n_priors))
-            whole[: len(member), :n_freq], whole[len(member) :, n_freq:] = member, np.eye(n_priors)
-            parts = LineParts(whole @ lines.gradient, np.tensordot(whole, lines.information, 1))
-            of_blocks = self._scatter(parts)
+            of_blocks = self._scatter(self._grouped(lines, block_members(share, seen)))
+            if motion is not None:
+                by_motion = seen[np.argsort(motion[seen], kind="stable")]
+                between = self._scatter(self._grouped(lines, block_members(share, by_motion)))
         hits = [self._scatter(self._parts(axis)) for axis, count in ((2, n_o), (3, n_i)) if count > 1]
-        return spread_of_scatters(np.full(self.held.size, by_noise), of_lines, of_blocks, hits, beside)
+        spread = spread_of_scatters(np.full(self.held.size, by_noise), of_lines, of_blocks, hits, beside)
+        return spread if motion is None else spread.between_amplitudes(between)
+
+    def _grouped(self, lines: LineParts, member: FloatArray) -> LineParts:
+        """Return groups of lines, by which lines are in which, shape (n_groups, n_freq), with priors as they are."""
+        n_priors = len(self.priors.gradient)
+        whole = np.zeros((len(member) + n_priors, member.shape[1] + n_priors))
+        whole[: len(member), : member.shape[1]], whole[len(member) :, member.shape[1] :] = member, np.eye(n_priors)
+        return LineParts(whole @ lines.gradient, np.tensordot(whole, lines.information, 1))
 
     def _scatter(self, parts: LineParts, correlated: float = 1.0) -> Scatter:
         found = Scatter.none(self.held.size)
