@@ -372,7 +372,7 @@ def test_python_of_the_page_on_the_engine_runs(capsys, monkeypatch, tmp_path, be
     assert sorted(path.name for path in tmp_path.iterdir()) == ["joint.html", "joint.json"]
     printed = capsys.readouterr().out
     assert "h_theta_z" in printed
-    assert "note choice ('y',) damping of y: hysteretic" in printed
+    assert "note damping-chosen ('y',) damping of y: hysteretic" in printed
     assert "CBUSH" in printed
 
 
