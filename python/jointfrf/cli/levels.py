@@ -30,6 +30,7 @@ from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_file import write_joint
 from jointfrf.identification.result import Fit
 from jointfrf.io.csv_file import read_text_table
+from jointfrf.messages.of_data import FATAL_CODES
 from jointfrf.report.levels_page import levels_csv, write_levels
 from jointfrf.spelling import did_you_mean
 
@@ -290,7 +291,7 @@ def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Driv
     if args.model is not None:
         measured = measured_assembly(args.model, frfs, bands=args.band)
         with waiting(f"fit of {test.path.name}"):
-            return measured.fit(noise=args.noise), drive
+            return measured.fit(noise=args.noise, accept=FATAL_CODES), drive
     joint = measured_joint(own, frfs)
     channels = [str(one) for one in joint.responses.channels]
     if drive.held == "response" and drive.channel not in channels:
@@ -298,7 +299,7 @@ def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Driv
         raise UsageError(f"--held {drive.channel}: {test.path.name} has {', '.join(channels)} at the joint{hint}")
     with waiting(f"fit of {test.path.name}"):
         known = joint.known(frfs)
-        fit = identify(frfs.freq_hz, joint.h, joint.dofs, args.band, noise=args.noise, **known)
+        fit = identify(frfs.freq_hz, joint.h, joint.dofs, args.band, noise=args.noise, accept=FATAL_CODES, **known)
     if drive.held == "response" and isinstance(fit.data, FitData):
         drive = replace(drive, channel=fit.data.response_names[channels.index(drive.channel)])
     return fit, drive

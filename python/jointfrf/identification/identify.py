@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.channels.check.amplitude import amplitude_of_channels, motion_of_lines
-from jointfrf.channels.check.check import as_accepted, check_frfs, stop_at_errors
+from jointfrf.channels.check.check import as_accepted, check_frfs, stop_at_errors, wrong_numbers_of
 from jointfrf.channels.check.result import FrfCheck
 from jointfrf.frf.bands import spread_lines
 from jointfrf.frf.setups import SetUps
@@ -219,6 +219,10 @@ def _look_at(
 ) -> list[Finding]:
     """Return errors and warnings of the FRFs; amplitude dependence of `raw` ones if models corrected them."""
     h, found = problem.frfs.measured if raw is None else raw, list[Finding]()
+    names = channel_names(problem.frfs, problem.dofs, as_pair(transform))
+    wrong = wrong_numbers_of(problem.freq_hz, h, *names)
+    if wrong is not None:
+        return [wrong]
     if problem.options.reciprocal:
         transforms = None if transform is None else (problem.frfs.responses, problem.frfs.forces)
         check = _checked(MeasuredFrfs(problem.freq_hz, problem.frfs.measured), problem.dofs, transforms)
@@ -226,7 +230,6 @@ def _look_at(
         if raw is None and all(one.code != "amplitude-dependent" for one in found):
             return found
     # by the names of the channels
-    names = channel_names(problem.frfs, problem.dofs, as_pair(transform))
     others = [one for one in found if one.code != "amplitude-dependent"]
     return others + amplitude_of_channels(problem.freq_hz, h, *names)
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.channels.check.amplitude import motion_of_lines
-from jointfrf.channels.check.check import as_accepted, check_frfs, stop_at_errors
+from jointfrf.channels.check.check import as_accepted, check_frfs, stop_at_errors, wrong_numbers_of
 from jointfrf.frf.bands import spread_lines
 from jointfrf.frf.setups import SetUps
 from jointfrf.identification.describe import describe_model
@@ -169,6 +169,9 @@ def identify_model(
 
 def _look_at(problem: ModelProblem, channels: Channels) -> list[Finding]:
     """Return errors and warnings of the FRFs, but for gains that are unknowns of the fit."""
+    wrong = wrong_numbers_of(problem.freq_hz, problem.measured, channels.responses, channels.forces)
+    if wrong is not None:
+        return [wrong]
     some = spread_lines(problem.freq_hz.size)
     check = check_frfs(
         problem.freq_hz[some], problem.measured[some], responses=channels.responses, forces=channels.forces

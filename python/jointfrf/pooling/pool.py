@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from jointfrf.identification.result import Fit, columns_of
 from jointfrf.kernel.arguments import FloatArray, as_names, as_number, as_probability, check_type, one_line
 from jointfrf.messages.finding import Finding, WithFindings, worst_first
+from jointfrf.messages.of_data import DATA_MESSAGES
 from jointfrf.pooling.parameter import ASSEMBLY, Estimate, PooledParameter, TestPlan, pooled_parameter, shown_chance
 from jointfrf.spelling import did_you_mean
 
@@ -145,7 +146,8 @@ def pool(
     for name in chosen or ():
         if name not in units:
             raise ValueError(f"no fit has a parameter {one_line(name)}{did_you_mean(name, units)}")
-    pooled, findings = dict[str, PooledParameter](), list[Finding]()
+    pooled = dict[str, PooledParameter]()
+    findings = [one for label, fit in zip(plan.labels, listed, strict=True) for one in _of_data(label, fit)]
     for name in units if chosen is None else dict.fromkeys(chosen):
         found = [own[name][1] if name in own else None for own in each]
         parameter, own_findings = pooled_parameter(name, units[name], found, plan)
@@ -153,6 +155,11 @@ def pool(
         if parameter is not None:
             pooled[name] = parameter
     return PooledFits(plan.labels, pooled, probability, worst_first(findings))
+
+
+def _of_data(label: str, fit: Fit) -> list[Finding]:
+    """Return errors and warnings about the FRFs of a fit, with its name."""
+    return [replace(one, test=label) for one in fit.findings if one.code in DATA_MESSAGES and one.severity != "note"]
 
 
 def _estimates(fit: Fit) -> dict[str, tuple[str, Estimate]]:

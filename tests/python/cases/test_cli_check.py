@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import jointfrf as jf
 from command import run_command
 from hammer_test import hammer_test, noisy
 from jointfrf.io import read_uff, write_uff
@@ -52,14 +53,45 @@ def test_identify_stops_at_it_unless_it_is_accepted(wrong, tmp_path):
     assert not (tmp_path / "joint.json").exists()
     assert run_command(*words, "--accept", "sign").returncode == 2
     frfs = read_uff(BARS)
-    write_uff(wrong, replace(frfs, h=frfs.h.conj()))
-    stopped = run_command(*words)
-    assert stopped.returncode == 1
-    assert stopped.stderr.endswith("[time-convention]\n")
-    accepted = run_command(*words, "--accept", "time-convention", "--json")
+    write_uff(wrong, replace(frfs, h=-frfs.h))  # of all sensors
+    assert run_command(*words).stderr.endswith("say --accept driving-point-sign [driving-point-sign]\n")
+    accepted = run_command(*words, "--accept", "driving-point-sign", "--json")
     assert accepted.returncode == 0, accepted.stderr
     for content in (json.loads(accepted.stdout)["fits"][0], json.loads((tmp_path / "joint.json").read_text())):
-        assert content["findings"][0]["code"] == "time-convention"
+        assert content["findings"][0]["code"] == "driving-point-sign"
+
+
+@pytest.fixture
+def parts(tmp_path):
+    """Two chains and their assembly, of which B has one sensor reversed, and the words that name joint and files."""
+    freq = np.linspace(0.5, 10, 300)
+    a = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start").receptance(freq)
+    b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end").receptance(freq)
+    whole = jf.couple(a, b, jf.Joint([2000.0], [3.0], ["x"]).dynamic_stiffness(freq), [1], [0])
+    b = b * np.array([-1.0, 1.0])[:, None]
+    for name, h, nodes in (("a", a, (1, 2)), ("b", b, (11, 12)), ("whole", whole, (1, 2, 11, 12))):
+        channels = tuple(jf.io.Channel(node, "+x") for node in nodes)
+        noisy_h = jf.pollute(h, 0.005, seed=len(name))
+        jf.io.write_frfs(tmp_path / f"{name}.npz", jf.io.FrfSet(freq, channels, channels, noisy_h, "receptance"))
+    (tmp_path / "joint.toml").write_text('dofs = ["x"]\nstiffness = [2000.0]\ndamping = [3.0]\n')
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["couple", "a.npz", "b.npz", "--joint", "joint.toml", "--j", "2", "--k", "11", "--output", "ab.npz"],
+        ["decouple", "a.npz", "b.npz", "whole.npz", "--j", "2", "--k", "11", "--dofs", "x", "--s", "12:x"],
+        ["validate", "a.npz", "b.npz", "whole.npz", "--joint", "joint.toml", "--j", "2", "--k", "11"],
+    ],
+)
+def test_commands_of_parts_warn_of_a_reversed_sensor(parts, monkeypatch, words):
+    monkeypatch.chdir(parts)
+    result = run_command(*words)
+    assert result.returncode == 0, result.stderr
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("jointfrf: warning: b.npz: the response 11:+x points against its force")
+    assert line.endswith("[driving-point-sign]")
 
 
 def test_frfs_that_are_missing(tmp_path):

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
+from jointfrf.channels.check.amplitude import amplitude_of_channels
 from jointfrf.channels.check.check import warn_of_frfs
 from jointfrf.channels.check.pair_ratios import ratio_line
 from measurement_errors import ERRORS, KINDS_OF_NOISE, check_with_error, measured, names, structure
+from time_records import time_test
 
 S = structure("3.3")
 NAMES = names(S)
@@ -308,6 +310,57 @@ def test_identify_looks_first(beams):
 def test_bad_arguments_get_one_sentence(change, message):
     with pytest.raises(ValueError, match=message):
         jf.check_frfs(**(dict(freq_hz=S.freq, h=noisy()) | change))
+
+
+def wrongly_read(what):
+    """FRFs whose magnitudes or phases a file states in another way than it was read."""
+    h = noisy()
+    omega = 2 * np.pi * S.freq[:, None, None]
+    if what == "radians as degrees":
+        return abs(h) * np.exp(1j * np.radians(np.angle(h))), "receptance"
+    if what == "radians as degrees, accelerance":
+        wrong = -(omega**2) * h
+        return abs(wrong) * np.exp(1j * np.radians(np.angle(wrong))) / -(omega**2), "accelerance"
+    if what == "no sign":
+        return abs(h) * np.exp(1j * abs(np.angle(h))), "receptance"
+    if what == "no sign, mobility":
+        wrong = 1j * omega * h
+        return abs(wrong) * np.exp(1j * abs(np.angle(wrong))) / (1j * omega), "mobility"
+    return 20 * np.log10(abs(h)) * np.exp(1j * np.angle(h)), "receptance"
+
+
+@pytest.mark.parametrize(
+    ("what", "code"),
+    [
+        ("radians as degrees", "phase-unit"),
+        ("radians as degrees, accelerance", "phase-unit"),
+        ("no sign", "unsigned-phase"),
+        ("no sign, mobility", "unsigned-phase"),
+        ("decibels", "decibel"),
+    ],
+)
+def test_numbers_that_were_read_wrongly_are_the_only_finding(what, code):
+    h, quantity = wrongly_read(what)
+    assert [one.code for one in jf.check_frfs(S.freq, h, NAMES, read_as=quantity).findings] == [code]
+    with pytest.raises(jf.FrfCheckError, match=rf"\[{code}\]$"):
+        jf.identify(S.freq, wrongly_read(what.split(",")[0])[0], S.dofs)
+
+
+def test_quiet_or_undamped_frfs_are_not_read_wrongly():
+    """Below the first resonance, of one driving point alone, and without any damping."""
+    some = S.freq < 40
+    assert jf.check_frfs(S.freq[some], noisy()[some], NAMES).ok
+    assert jf.check_frfs(S.freq, noisy()[:, :1, :1], ["y"]).ok
+    a = jf.chain([4, 2, 3], [2000, 2500, 900], [0, 0, 0], ground="start")
+    freq = np.linspace(0.5, 8, 600)
+    codes = {one.code for one in jf.check_frfs(freq, a.receptance(freq)).findings}
+    assert not codes & {"phase-unit", "unsigned-phase", "decibel"}
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_linear_tests_with_leakage_are_not_amplitude_dependent(seed):
+    one = time_test(seed)
+    assert amplitude_of_channels(one.freq_hz, one.h, *(list(map(str, range(n))) for n in one.h.shape[1:])) == []
 
 
 @pytest.mark.parametrize("step", [40, 26, 20])

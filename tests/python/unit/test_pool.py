@@ -217,3 +217,17 @@ def test_wrong_words_are_one_sentence(words, status, message, tmp_path, monkeypa
 
 def test_cells_of_the_table_start_no_formula(fits):
     assert "'=1+1" in pool_csv(jf.pool(fits, labels=["=1+1", *"bcdefgh"]))
+
+
+def test_a_pool_names_the_findings_of_the_frfs_of_its_fits(fits, tmp_path, capsys):
+    wrong = fits[2].with_findings([jf.Finding("channel-gain", dict(factor=1.1, error=0.01), ("1:y",))])
+    fits[2] = wrong.with_findings([*wrong.findings, jf.Finding("sides-unchecked")])
+    pooled = jf.pool(fits)
+    (one,) = [one for one in pooled.findings if one.code == "channel-gain"]
+    assert one.test == pooled.labels[2]
+    for i, fit in enumerate(fits):
+        jf.save(fit, tmp_path / f"t{i}.json")
+    assert main(["pool", *(str(tmp_path / f"t{i}.json") for i in range(len(fits))), "--json"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert any(text.startswith("t2: ") and text.endswith("[channel-gain]") for text in content["warnings"])
+    assert [found["code"] for found in content["findings"] if found["test"] == "t2"] == ["channel-gain"]

@@ -70,7 +70,15 @@ from jointfrf.messages.finding import Finding, as_warning, worst_first
 from jointfrf.messages.of_data import FATAL_CODES
 from jointfrf.spelling import some_of
 
-__all__ = ["as_accepted", "check_frfs", "stop_at_errors", "warn_of_frfs", "warn_of_sets", "wrong_numbers"]
+__all__ = [
+    "as_accepted",
+    "check_frfs",
+    "stop_at_errors",
+    "warn_of_frfs",
+    "warn_of_sets",
+    "wrong_numbers",
+    "wrong_numbers_of",
+]
 
 #: Share of FRFs that run backwards from which all are conjugated.
 _BACKWARDS = 0.8
@@ -222,12 +230,24 @@ def warn_of_sets(*sets: FrfSet, stacklevel: int = 2) -> None:
 
 
 def wrong_numbers(frfs: FrfSet) -> Finding | None:
-    """Return what is wrong with all magnitudes or phases of a set: units that were not the stated ones."""
+    """Return what is wrong with all magnitudes or phases of a set of FRFs; None if nothing is."""
     lines = frfs.receptance()
-    missing = np.asarray(np.isnan(lines.h).all(axis=0))
-    good = np.isfinite(lines.h[:, ~missing]).all(axis=1) & (lines.freq_hz > 0)
-    m = as_measurement(lines.freq_hz[good], lines.h[good], lines.responses, lines.excitations, missing)
-    return representation_finding(m, frfs.quantity) if np.count_nonzero(good) >= LEAST_LINES else None
+    return wrong_numbers_of(lines.freq_hz, lines.h, lines.responses, lines.excitations, frfs.quantity)
+
+
+def wrong_numbers_of(
+    freq_hz: FloatArray,
+    h: ComplexArray,
+    responses: Sequence[str | Channel],
+    forces: Sequence[str | Channel],
+    read_as: str | None = None,
+) -> Finding | None:
+    """Return what is wrong with all magnitudes or phases of receptances, which were read as some quantity."""
+    missing = np.asarray(np.isnan(h).all(axis=0))
+    good = np.isfinite(h[:, ~missing]).all(axis=1) & (freq_hz > 0)
+    if np.count_nonzero(good) < LEAST_LINES:
+        return None
+    return representation_finding(as_measurement(freq_hz[good], h[good], responses, forces, missing), read_as)
 
 
 def as_accepted(accept: Sequence[str]) -> tuple[str, ...]:

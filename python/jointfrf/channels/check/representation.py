@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.channels.check.pair_ratios import block_medians
 from jointfrf.channels.check.signals import Measurement, modulus
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -20,12 +19,14 @@ __all__ = ["representation_finding"]
 _RISE = 3.0
 #: Lines over which the turn of an FRF in the complex plane is added up, and standard errors from which it has a sign.
 _BLOCK, _SIGNIFICANT = 8, 5.0
-#: Share of the turn of all FRFs that goes either way if the sign of phases is lost; of smooth FRFs all goes one way.
-_EITHER_WAY = 0.1
+#: Share of the turn of all FRFs that goes either way if the sign of phases is lost: of measured FRFs less than 0.003.
+_EITHER_WAY = 0.02
 #: Receptances below this, m/N, are none in decibels: -20 dB is the largest magnitude that is found.
 _LEAST_DECIBEL = 20.0
 #: Magnitudes in decibels change over frequency by less than this factor, while the phase turns by half circles.
 _FLAT = 4.0
+#: Quantiles of the magnitudes over the lines: antiresonances are left out.
+_MOST = (0.05, 0.95)
 #: Half turns of the phase that a flat magnitude must have.
 _HALF_TURNS = 2
 
@@ -64,7 +65,7 @@ def _has_peak(size: FloatArray) -> NDArray[np.bool_]:
 
 def _decibel(h: ComplexArray, size: FloatArray) -> Finding | None:
     """Find magnitudes in decibels that were read as linear: large and flat, while the phase turns."""
-    low, high = size.min(axis=0), size.max(axis=0)
+    low, high = np.quantile(size, _MOST, axis=0)
     if not ((np.median(size, axis=0) > _LEAST_DECIBEL) & (high < _FLAT * low)).all():
         return None
     turns = np.ptp(np.unwrap(np.angle(h), axis=0), axis=0) / np.pi
@@ -81,8 +82,9 @@ def _unsigned(h: ComplexArray, has_transfer: bool) -> Finding | None:
     count = max(len(turn) // _BLOCK, 1)
     whole = turn[: count * _BLOCK].reshape(count, -1, h.shape[1])
     total = whole.sum(axis=1)
-    spread = np.sqrt(((whole - block_medians(turn, _BLOCK)[:count, None]) ** 2).sum(axis=1))
-    total = np.where(abs(total) > _SIGNIFICANT / np.sqrt(_BLOCK) * spread, total, 0.0)
+    # standard error by successive differences, which a smooth turn hardly enters
+    error = np.sqrt((np.diff(whole, axis=1) ** 2).sum(axis=1) / 2)
+    total = np.where(abs(total) > _SIGNIFICANT * error, total, 0.0)
     total = total / np.maximum(abs(total).sum(axis=0), np.finfo(float).tiny)
     forward, back = float(np.maximum(total, 0).sum()), float(np.maximum(-total, 0).sum())
     if min(forward, back) <= _EITHER_WAY * (forward + back):
