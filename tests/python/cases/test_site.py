@@ -76,7 +76,7 @@ def test_the_site_is_built_without_a_warning(tmp_path):
             page.goto((tmp_path / "site" / path).as_uri())
             assert page.evaluate("document.documentElement.scrollWidth") <= 390, path
         wide = browser.new_context(viewport={"width": 1280, "height": 800}).new_page()
-        for path in ("docs/index.html", "docs/quickstart.html"):
+        for path in ("docs/index.html", "docs/quickstart.html", "docs/measured-file.html"):
             wide.goto((tmp_path / "site" / path).as_uri())
             clipped = (
                 "all => all.filter(block => block.scrollWidth > block.clientWidth).map(block => block.textContent)"
