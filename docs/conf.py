@@ -71,7 +71,7 @@ html_theme_options = {
     "navigation_with_keys": False,
     "collapse_navigation": True,
     "show_prev_next": True,
-    "secondary_sidebar_items": ["page-toc"],
+    "secondary_sidebar_items": {"**": ["page-toc"], "docs/index": []},
     "footer_start": ["copyright"],
     "footer_end": [],
     "header_links_before_dropdown": 6,

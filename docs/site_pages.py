@@ -30,8 +30,9 @@ _ROOMS = {
 
 #: Sections of the site, and the documents of each in reading order, as files of the repository.
 _SECTIONS = {
-    "Start": ["README.md", "docs/tutorial.md", "docs/coming-from.md"],
+    "Start": ["README.md", "docs/quickstart.md", "docs/tutorial.md", "docs/coming-from.md"],
     "How to": [
+        "docs/measured-file.md",
         "docs/checks.md",
         "docs/model-fit.md",
         "docs/sides.md",

@@ -69,11 +69,18 @@ def test_the_site_is_built_without_a_warning(tmp_path):
     assert not re.search(r"(src|href)=\"https?://", text)  # it is read without a network
     # nor a server, and on a phone
     some = {"search.html", "docs/index.html", "docs/accuracy.html", "docs/generated/api/jointfrf.identify.html"}
-    some.add("docs/generated/examples/amplitude.html")
+    some |= {"docs/generated/examples/amplitude.html", "docs/quickstart.html", "docs/measured-file.html"}
     with started_browser() as browser:
         page = browser.new_context(viewport={"width": 390, "height": 800}).new_page()
         for path in sorted(some):
             page.goto((tmp_path / "site" / path).as_uri())
             assert page.evaluate("document.documentElement.scrollWidth") <= 390, path
+        wide = browser.new_context(viewport={"width": 1280, "height": 800}).new_page()
+        for path in ("docs/index.html", "docs/quickstart.html", "docs/measured-file.html"):
+            wide.goto((tmp_path / "site" / path).as_uri())
+            clipped = (
+                "all => all.filter(block => block.scrollWidth > block.clientWidth).map(block => block.textContent)"
+            )
+            assert wide.eval_on_selector_all("pre", clipped) == []
         page.goto((tmp_path / "site" / "search.html").as_uri() + "?q=loss+factor")
         page.wait_for_function("document.querySelectorAll('#search-results li').length > 3")
