@@ -169,7 +169,7 @@ def identify_model(
 
 def _look_at(problem: ModelProblem, channels: Channels) -> list[Finding]:
     """Return errors and warnings of the FRFs, but for gains that are unknowns of the fit."""
-    wrong = wrong_numbers_of(problem.freq_hz, problem.measured, channels.responses, channels.forces)
+    wrong = wrong_numbers_of(problem.freq_hz, problem.measured)
     if wrong is not None:
         return [wrong]
     some = spread_lines(problem.freq_hz.size)

@@ -57,16 +57,17 @@ def test_the_command_takes_the_decay_to_the_conversion(tmp_path):
 @pytest.mark.parametrize(("quantity", "power"), [("accelerance", 2), ("mobility", 1)])
 @pytest.mark.parametrize("sigma", [1.0, 4.0])
 def test_a_window_that_was_not_stated_is_named(quantity, power, sigma):
-    (said,) = [one for one in fitted(measured(quantity, sigma, 1), 0.0).findings if "1/frequency" in one.text]
+    (said,) = [one for one in fitted(measured(quantity, sigma, 1), 0.0).findings if one.code == "window-not-stated"]
     assert said.severity == "warning"
-    named = re.search(r"sigma ([\d.]+) /s of accelerances, ([\d.]+) /s of mobilities", said.text)
+    named = re.search(r"window of ([\d.]+) /s \(accelerances\) or ([\d.]+) /s \(mobilities\)", said.text)
     assert float(named[3 - power]) == pytest.approx(sigma, rel=0.3)
 
 
 @pytest.mark.parametrize(("c", "h"), [(5.0, 3000.0), (30.0, 0.0), (0.0, 6000.0)])
 def test_no_window_is_named_without_one(c, h):
     for seed in range(3):
-        assert "window" not in [one.kind for one in fitted(measured("accelerance", 0.0, seed, c=c, h=h), 0.0).findings]
+        fit = fitted(measured("accelerance", 0.0, seed, c=c, h=h), 0.0)
+        assert "window-not-stated" not in [one.code for one in fit.findings]
 
 
 def test_a_window_of_a_joint_between_flexible_sides():

@@ -79,7 +79,7 @@ def test_no_search_leaves_the_range_in_which_there_is_a_model(beam, force):
         limits = fit.confidence_interval()
         eta = fit.loss_factors["eta_theta_z"]
     assert {one.category.__name__ for one in issued} <= {"IdentificationWarning", "ConvergenceWarning"}
-    assert "residual" in [one.kind for one in fit.findings if one.severity == "warning"]
+    assert "residual-large" in [one.code for one in fit.findings if one.severity == "warning"]
     for name, (low, high) in limits.items():
         assert 0 <= low < fit.value[name] < high, name
     assert limits["k_theta_z"][0] < k.max()

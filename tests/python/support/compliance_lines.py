@@ -32,7 +32,7 @@ def fitted_group(terms, measured, std, start):
     )
     found = joint.minimise(forms, joint.coordinates(start))
     # There are no FRFs; their size, below which a compliance is rounding, is taken as zero.
-    data = SimpleNamespace(own_size=np.zeros(terms.n))
+    data = SimpleNamespace(own_size=np.zeros(terms.n), reference=np.zeros(terms.n), springs=None)
     problem = GroupProblem(np.arange(terms.n), np.arange(len(terms.parameters)), data, joint, None)
     return GroupFit.of(
         found,

@@ -106,9 +106,8 @@ def test_damping_terms_that_the_data_support(beams):
 def test_a_coupled_joint(beams):
     coupled = jf.Joint([[6e5, 1e4], [1e4, 5e3]], [20, 1.5], ["y", "theta"])
     measured = jf.pollute(beams.gamma(coupled), 0.005, seed=1)
-    with pytest.warns(jf.IdentificationWarning, match="coupled|residual"):
-        plain = jf.identify(beams.freq, measured, ["y", "theta"])
-    assert any("cross terms (cross)" in text for text in plain.warnings)
+    with pytest.warns(jf.IdentificationWarning, match=r"cross terms.*\[cross-terms-ignored\]"):
+        jf.identify(beams.freq, measured, ["y", "theta"])
     fit = jf.identify(beams.freq, measured, ["y", "theta"], cross="fit")
     assert not fit.warnings
     assert fit.value["k_y,theta"] == pytest.approx(1e4, rel=0.05)
@@ -159,14 +158,18 @@ def test_a_joint_too_stiff_to_be_seen_is_said_with_its_bound(beams):
     json.dumps(jf.fit_to_dict(fit), allow_nan=False)
 
 
-@pytest.mark.parametrize("seed", [10, 30])
-def test_a_best_estimate_lies_above_its_lower_bound_on_a_few_lines_too(seed):
-    """By the error of 1/k from the information alone it lay below it in these draws."""
-    freq, measured, joint = Trial("3.3", "complex", 0.05, step=300).draw(seed)
-    with pytest.warns(jf.IdentificationWarning, match="k_theta cannot be distinguished from rigid: at least"):
+@pytest.mark.filterwarnings("ignore::jointfrf.errors.IdentificationWarning")
+def test_a_best_estimate_lies_above_its_lower_bound_on_a_few_lines_too():
+    """By the error of the compliance from the information alone it lay below it in some draws."""
+    rigid = 0
+    for seed in range(20):
+        freq, measured, joint = Trial("3.3", "complex", 0.05, 300, step=49).draw(seed)
         fit = jf.identify(freq, measured, joint.dofs, damping="viscous")
-    low, high = fit.confidence_interval(0.95)["k_theta"]
-    assert 0 < low < fit.value["k_theta"] < high == np.inf
+        low, high = fit.confidence_interval(0.95)["k_theta"]
+        if low > 0 and high == np.inf:
+            rigid += 1
+            assert low < fit.value["k_theta"]
+    assert rigid > 5
 
 
 @pytest.mark.parametrize("seed", range(1, 5))

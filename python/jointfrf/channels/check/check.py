@@ -193,7 +193,7 @@ def check_frfs(
     state = _Progress(measurement, 1 if blame == "responses" else 2, read_as)
     state.findings.extend([*_missing_findings(missing, joint, *labels), *found])
     is_enough = measurement.freq_hz.size >= LEAST_LINES and measurement.h.size > 0
-    wrong = representation_finding(measurement, read_as) if is_enough else None
+    wrong = wrong_numbers_of(measurement.freq_hz, measurement.h, read_as, measurement.hidden) if is_enough else None
     if wrong is not None:
         state.findings.append(wrong)  # every other check would find consequences of it
     elif is_enough:
@@ -232,22 +232,20 @@ def warn_of_sets(*sets: FrfSet, stacklevel: int = 2) -> None:
 def wrong_numbers(frfs: FrfSet) -> Finding | None:
     """Return what is wrong with all magnitudes or phases of a set of FRFs; None if nothing is."""
     lines = frfs.receptance()
-    return wrong_numbers_of(lines.freq_hz, lines.h, lines.responses, lines.excitations, frfs.quantity)
+    return wrong_numbers_of(lines.freq_hz, lines.h, frfs.quantity)
 
 
 def wrong_numbers_of(
-    freq_hz: FloatArray,
-    h: ComplexArray,
-    responses: Sequence[str | Channel],
-    forces: Sequence[str | Channel],
-    read_as: str | None = None,
+    freq_hz: FloatArray, h: ComplexArray, read_as: str | None = None, hidden: NDArray[np.bool_] | None = None
 ) -> Finding | None:
     """Return what is wrong with all magnitudes or phases of receptances, which were read as some quantity."""
-    missing = np.asarray(np.isnan(h).all(axis=0))
-    good = np.isfinite(h[:, ~missing]).all(axis=1) & (freq_hz > 0)
+    missing = np.asarray(np.isnan(h).all(axis=0)) if hidden is None else hidden
+    good = (np.isfinite(h) | missing).all(axis=(1, 2)) & (freq_hz > 0)
     if np.count_nonzero(good) < LEAST_LINES:
         return None
-    return representation_finding(as_measurement(freq_hz[good], h[good], responses, forces, missing), read_as)
+    if not good.all():
+        freq_hz, h = freq_hz[good], h[good]
+    return representation_finding(freq_hz, h, missing, read_as)
 
 
 def as_accepted(accept: Sequence[str]) -> tuple[str, ...]:

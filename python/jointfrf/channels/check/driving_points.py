@@ -43,6 +43,7 @@ _STEEPEST = -2.2
 _LEAST_SPAN = 3.0
 #: Names of the quantities, by the power of i w.
 _NAMES = ("receptances", "mobilities", "accelerances")
+_UNITS = ("m/N", "m/s/N", "(m/s^2)/N")
 #: What was divided too often, by the power that is left.
 _TAKEN_FOR = {
     -1: "receptances divided by i w: mobilities read as accelerances, or receptances read as mobilities",
@@ -293,9 +294,9 @@ def _quantity_and_action(power: int, read_as: str | None) -> tuple[str, str]:
     does = f"Divide by {factor}" if power > 0 else f"Multiply by {factor}"
     actual = POWER_OF_I_OMEGA.get(read_as or "", -9) + power
     if read_as is not None and 0 <= actual <= 2:
-        word = tuple(POWER_OF_I_OMEGA)[actual]
         quantity = _NAMES[actual] if power > 0 and read_as == "receptance" else f"{_NAMES[actual]} read as {read_as}"
-        return quantity, f"Read the file as {_NAMES[actual]} (quantity {word}, forced)"
+        options = f"`--unit {_UNITS[actual]} --force-quantity` (`unit=`, `force_quantity=`)"
+        return quantity, f"Read the file as {_NAMES[actual]}: {options}"
     if read_as is not None:
         return _NAMES[power] if power > 0 else _TAKEN_FOR[power], does
     return _NAMES[power] if power > 0 else _TAKEN_FOR[power], f"{does}, or state the quantity when you read the file"

@@ -22,7 +22,7 @@ from jointfrf.identification.manifold.coordinates import (
     LawCoordinates,
     coordinates_of,
 )
-from jointfrf.identification.manifold.group_fit import LITTLE_PATIENCE, GroupFit, GroupProblem, fit_dofs
+from jointfrf.identification.manifold.group_fit import LITTLE_PATIENCE, LOST, GroupFit, GroupProblem, fit_dofs
 from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold.line_forms import FormMinimum, NamedParameter
 from jointfrf.identification.manifold.on_manifold import LineData, OnManifold
@@ -306,12 +306,20 @@ class _Search:
 
     @cached_property
     def on_manifold(self) -> GroupFit:
-        """The fit without cross terms, from single lines, and if that is lost from the diagonal of C."""
-        found = fit_dofs(self.problem, self.starts)
-        if not found.is_lost:
-            return found
-        start = self.problem.joint.coordinates(self.diagonal.joint.theta(self.diagonal.x))
-        return min(found, fit_dofs(self.problem, [start], LITTLE_PATIENCE), key=lambda one: one.squares)
+        """The fit without cross terms, from the compliance of single lines, then from the diagonal of C."""
+        return fit_dofs(self.problem, self._every_start())
+
+    def _every_start(self) -> Iterator[FloatArray]:
+        yield from self.starts
+        yield self.problem.joint.coordinates(self.diagonal.joint.theta(self.diagonal.x))
+
+    @property
+    def needs_cross_terms(self) -> bool:
+        """Whether no joint without cross terms is near the data, and the diagonal of C alone fits far better."""
+        found = self.on_manifold
+        if found.joint.n == 1 or found.is_good or self.problem.sides_bend or found.excess < LOST:
+            return False
+        return found.is_lost or found.excess > _FAR_BETTER * self.diagonal.excess
 
 
 def _starts_of_lines(data: LineData, terms: JointTerms) -> list[FloatArray]:
@@ -331,7 +339,7 @@ def _from_another_fit(search: _Search) -> GroupFit | None:
 def _from_lines(search: _Search) -> GroupFit | None:
     """Start from single lines where no cross term of C is assumed to be zero; then from the joint without them."""
     problem, joint = search.problem, search.problem.joint
-    if joint.in_compliance and joint.n > 1:
+    if joint.in_compliance:
         return None
     found = fit_dofs(problem, search.starts)
     is_last = found.is_good or (problem.sides_bend and not found.is_lost)
@@ -371,7 +379,7 @@ def _with_cross_terms_ignored(search: _Search) -> GroupFit | None:
 
 def _without_cross_terms(search: _Search) -> GroupFit | None:
     """Fit with cross terms of zero, unless that stays far from the data."""
-    return None if search.on_manifold.is_lost else search.on_manifold
+    return None if search.needs_cross_terms else search.on_manifold
 
 
 def _with_cross_terms_unknown(search: _Search) -> GroupFit | None:

@@ -32,6 +32,7 @@ from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 __all__ = [
     "FAR",
     "LITTLE_PATIENCE",
+    "LOST",
     "GroupFit",
     "GroupProblem",
     "UnknownCrossTerms",
@@ -55,7 +56,7 @@ _NOT_SMOOTHED, _BY_CHANCE, _LEVEL = 50, 1e-3, 2.0
 #: number lines that are not used do not come back.
 PATIENCE, LITTLE_PATIENCE = 8, 4
 #: A fit is far from the data when the squares exceed their number by this factor.
-_LOST = 9.0
+LOST = 9.0
 #: Fits whose squares differ by less have ended at the same place.
 _SAME = 1.0
 #: A residual may be noise up to this mean square, for what is not known of the noise, and so many standard deviations.
@@ -204,7 +205,7 @@ class GroupFit(FormMinimum):
     @property
     def is_lost(self) -> bool:
         """Whether it ended far from the data."""
-        return not self.converged and self.excess > _LOST
+        return not self.converged and self.excess > LOST
 
     @property
     def is_noise(self) -> bool:
@@ -370,7 +371,7 @@ def _iterated(
         change, count = minimum.x - x, float(equations[used].sum())
         # In standard errors along the direction of the step: what the data do not see may go anywhere.
         moved = float(np.sqrt(abs(2 * (change @ minimum.information @ change))))
-        is_lost = minimum.cost > _LOST * count
+        is_lost = minimum.cost > LOST * count
         converged = choice_of_m.holds_for(minimum, step) and bool(moved < _MOVED * np.sqrt(x.size)) and is_whole
         if length.is_spent and not converged and moved < _SWINGS * np.sqrt(x.size):
             # Between the two ends, a tenth of the way of which was the last step.
@@ -505,7 +506,8 @@ def _rescued(data: LineData, c: ComplexArray, on: OnManifold) -> OnManifold:
     far = np.flatnonzero(~(on.squares <= FAR * data.entries.n**2))
     if far.size == 0 or far.size == len(c):
         return on
-    other = starts_on_manifold(data.on_lines(far), c[far], _OTHER_STEPS)
+    pieces = in_pieces(far.size, lambda own: starts_on_manifold(data.on_lines(far[own]), c[far[own]], _OTHER_STEPS))
+    other = OnManifold(*pieces)
     squares = on.squares.copy()
     h, q = on.h.copy(), on.q.copy()
     nearer = other.squares < squares[far]
