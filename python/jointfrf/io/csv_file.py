@@ -151,7 +151,7 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
     numbers = np.array([_numbers(table, place, cells) for place, cells in table.rows])
     if not numbers.size or not columns:
         raise FileContentError(f"{path} holds no table of numbers below its heading")
-    parts: dict[tuple[Channel, Channel], dict[str, _Column]] = {}
+    parts: dict[tuple[Channel, Channel], dict[str, _FrfPart]] = {}
     for column, values in zip(columns, numbers.T[1:], strict=True):
         if column.part in parts.setdefault(column.pair, {}):
             raise FileContentError(f"{where} has two columns {column.part} of {column.pair[0]} / {column.pair[1]}")
@@ -236,7 +236,7 @@ def _without_heading(path: Path, name: str) -> str:
     )
 
 
-class _Column(NamedTuple):
+class _FrfPart(NamedTuple):
     """A column: response and excitation, part of the FRF, its unit and quantity in the heading, its numbers."""
 
     pair: tuple[Channel, Channel]
@@ -251,7 +251,7 @@ class _Column(NamedTuple):
         return f"{self.part} of {self.pair[0]} / {self.pair[1]}"
 
 
-def _column(name: str, where: str, namer: ChannelNamer) -> _Column:
+def _column(name: str, where: str, namer: ChannelNamer) -> _FrfPart:
     """Read a heading: all that is left without channels, part and words without a meaning is the unit."""
     match = _PAIR.search(name)
     if match is not None:
@@ -270,7 +270,7 @@ def _column(name: str, where: str, namer: ChannelNamer) -> _Column:
             rest = f"{rest[: place.start()]} {rest[place.end() :]}"
             quantity = _QUANTITY.search(rest)
             unit = " ".join(_FILLERS.sub(" ", _QUANTITY.sub(" ", rest)).strip(" ,;:/_-|").split())
-            return _Column(pair, part, _without_in(unit), quantity[1].lower() if quantity else "")
+            return _FrfPart(pair, part, _without_in(unit), quantity[1].lower() if quantity else "")
     raise FileContentError(
         f"{where}: unknown column {name[:60]!r}; name response / excitation and real, imag, magnitude, phase or "
         "coherence, such as '102:+y / 101:+y real [m/N]'"
@@ -297,7 +297,7 @@ def _parts_in(text: str, start: int, end: re.Match[str] | None) -> list[tuple[st
 
 
 def _functions(
-    columns: dict[str, _Column], frequency: NDArray[np.float64], stated: str, reading: Reading, where: str
+    columns: dict[str, _FrfPart], frequency: NDArray[np.float64], stated: str, reading: Reading, where: str
 ) -> list[LooseFunction]:
     """FRF of one pair of channels, and its coherence where there is one."""
     pair = next(iter(columns.values())).pair
@@ -326,7 +326,7 @@ def _functions(
     return found
 
 
-def _one_unit(column: _Column, stated: str, where: str) -> str:
+def _one_unit(column: _FrfPart, stated: str, where: str) -> str:
     """Return the unit of the heading, or the one that a comment states for all columns."""
     if column.unit and stated and parse_unit(column.unit) != parse_unit(stated):
         raise FileContentError(
@@ -335,7 +335,7 @@ def _one_unit(column: _Column, stated: str, where: str) -> str:
     return column.unit or stated
 
 
-def _linear(column: _Column, unit: str, reading: Reading, where: str) -> tuple[str, NDArray[np.float64]]:
+def _linear(column: _FrfPart, unit: str, reading: Reading, where: str) -> tuple[str, NDArray[np.float64]]:
     """Return unit and values of magnitudes, of levels with their reference as the unit."""
     stated, reference = reading.units.level, parse_level(unit)
     of_channels = f"of the magnitude of {column.pair[0]} / {column.pair[1]}"
@@ -351,7 +351,7 @@ def _linear(column: _Column, unit: str, reading: Reading, where: str) -> tuple[s
         return reference or reading.units.ratio, np.asarray(10.0 ** (column.values / 20.0))
 
 
-def _radians(column: _Column, reading: Reading, where: str) -> float:
+def _radians(column: _FrfPart, reading: Reading, where: str) -> float:
     """Return the unit of phases in rad, the one that the user states or the one of the heading."""
     by_file = parse_phase_unit(column.unit)
     try:
