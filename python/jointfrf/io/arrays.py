@@ -189,7 +189,7 @@ def _pairs(frfs: FrfSet, chosen: NDArray[np.bool_]) -> str:
 
 def contradiction(said: str, wanted: str, where: str) -> str:
     """Say that a file and its user contradict each other, as the end of a sentence that begins with the file."""
-    return f"says that it holds {said} ({where}), not {wanted}: leave the quantity out, or force it"
+    return f"states {said} ({where}), not {wanted}; leave quantity and unit out, or give unit and force_quantity"
 
 
 def _numbers(what: str, values: Any) -> NDArray[Any]:

@@ -122,8 +122,9 @@ DATA_MESSAGES: Final[Mapping[str, Message]] = {
         "and damping would be meaningless.",
         why="The file does not state its quantity, or states a wrong one: accelerances were read as receptances, or "
         "the reverse.",
-        do="State the quantity: `--quantity accelerance`, and `--force-quantity` if the file states another one. In "
-        'Python use `quantity=`, or `fix=["quantity"]` of `check_frfs`.',
+        do="If the file states another quantity, give the right unit and force it: `--unit '(m/s^2)/N' "
+        "--force-quantity`. If it states none, give `--quantity` or `--unit`. In Python use `unit=`, "
+        '`force_quantity=` and `quantity=`, or `fix=["quantity"]` of `check_frfs`.',
     ),
     "time-convention": Message(
         "error",

@@ -198,6 +198,6 @@ def test_a_mobility_labelled_accelerance_is_cured_once(points, on_points, tmp_pa
     result = run_command("check", file, *words)
     (line,) = errors_of(result)
     assert "mobilities read as accelerance" in line
-    assert "Read the file as mobilities" in line
+    assert "Read the file as mobilities: `--unit m/s/N --force-quantity`" in line
     cured = run_command("check", file, *words, "--unit", "m/s/N", "--force-quantity")
     assert (cured.returncode, errors_of(cured)) == (0, [])

@@ -71,7 +71,7 @@ def test_several_files_become_one(tmp_path):
     ("words", "message"),
     [
         ([BARS], "the file to write is missing"),
-        ([BARS, "out.xlsx"], "out.xlsx has no suffix of a format that is written: .uff, .unv, .npz, .h5, .hdf5, .csv"),
+        ([BARS, "out.xlsx"], "out.xlsx has no suffix of a format that is written; use one of .uff, .unv"),
         ([BARS, "nowhere/out.npz"], "folder nowhere does not exist"),
         ([BARS, BARS], "two_bars.uff is also a file to read"),
         ([BARS, "a.npz", "--map", "H=A"], "'H=A' is not FIELD=NAME; use a field of freq_hz, h"),
@@ -91,12 +91,12 @@ def test_a_quantity_against_the_file_must_be_forced(tmp_path, command):
     words = [command, BARS, *([tmp_path / "a.npz"] if command == "convert" else []), "--quantity", "mobility"]
     refused = run_command(*words)
     assert refused.returncode == 1
-    assert "says that it holds accelerance (acceleration [m/s^2] per excitation force [N] in dataset" in refused.stderr
+    assert "states accelerance (acceleration [m/s^2] per excitation force [N] in dataset" in refused.stderr
     forced = run_command(*words, "--force-quantity")
     assert "the unit 'm/s^2' does not fit the response of mobility" in forced.stderr
     assert "give --unit, such as g/N" in forced.stderr
     forced = run_command(*words, "--force-quantity", "--unit", "m/s/N")
-    assert "says that it holds" not in forced.stderr
+    assert "states" not in forced.stderr
     assert "--unit" not in forced.stderr
 
 

@@ -415,11 +415,11 @@ def test_paths_through_a_link_mean_what_the_system_means(tmp_path, monkeypatch):
             "--unit mm/N is one of receptance, not mobility",
         ),
         ({}, ["--unit", "V"], "argument --unit: unit 'V' of frf is not understood; use motion per force, such as g/N"),
-        ({"unit": "m/N"}, ["--quantity", "mobility"], "leave --quantity out, or say --force-quantity"),
+        ({"unit": "m/N"}, ["--quantity", "mobility"], "leave --quantity and --unit out, or give --unit and --force-quantity"),
         ({"h": np.ones((2, 2, 2)), "freq_hz": [1.0, 2.0], "more": 1}, [], "give --map axes=, such as freq,out,in"),
         ({"y": 1}, [], "has several fields for h; give --map h=... out of h, y"),
         ({"responses": None}, [], "have no names of responses; give --map responses=..., such as 1:x,2:x"),
-        ({}, ["--map", "axis=3"], "'axis=3' is not FIELD=NAME with a field out of"),
+        ({}, ["--map", "axis=3"], "'axis=3' is not FIELD=NAME; use a"),
         ({}, ["--limit-gb", "1e-9"], "raise this limit by --limit-gb or the environment variable"),
     ],
 )
@@ -699,7 +699,7 @@ def test_the_limit_of_what_is_read_is_an_option(tmp_path, monkeypatch):
     result = run_command("check", BARS, "--limit-gb", "1e-6")
     assert result.returncode == 1
     assert "more than the 1e-06 GB that are read; raise this limit by --limit-gb or the environment" in result.stderr
-    assert "must be a number of GB above 0, not '0'" in run_command("check", BARS, "--limit-gb", "0").stderr
+    assert "'0' is not a number above 0; use a size in GB" in run_command("check", BARS, "--limit-gb", "0").stderr
     assert main(["check", str(BARS), "--limit-gb", "1e-6", "--quiet"]) == 1
     assert "JOINTFRF_FILE_LIMIT_GB" not in os.environ
 

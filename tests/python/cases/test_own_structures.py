@@ -131,7 +131,7 @@ def test_a_quantity_may_be_said(by_receptances):
         said = f'file = "a.uff"\nquantity = "{quantity}"'
         if quantity != "accelerance":
             path.write_text(text.replace('file = "a.uff"', said))
-            with pytest.raises(jf.FileContentError, match="says that it holds accelerance"):
+            with pytest.raises(jf.FileContentError, match="states accelerance"):
                 read_case(by_receptances)
             said += f'\nforce_quantity = true\nunit = "{"m/s/N" if quantity == "mobility" else "m/N"}"'
         path.write_text(text.replace('file = "a.uff"', said))

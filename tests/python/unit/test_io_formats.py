@@ -485,7 +485,7 @@ def test_units_are_shown_as_the_file_has_them_and_as_used(tmp_path):
     shown = str(found).splitlines()
     assert shown[1] == "in the file: FRFs of an unnamed quantity [g/N]"
     assert shown[2] == "used as: 1 accelerances (m/s^2)/N: 1 responses x 1 excitations, none missing"
-    with pytest.raises(FileContentError, match=r"the file says that it holds accelerance \(g/N\), not mobility"):
+    with pytest.raises(FileContentError, match=r"the file states accelerance \(g/N\), not mobility"):
         read_frfs(path, quantity="mobility")
     with pytest.raises(FileContentError, match="the unit 'g/N' does not fit mobility; give unit="):
         read_frfs(path, quantity="mobility", force_quantity=True)

@@ -170,7 +170,7 @@ def test_coherence_that_cannot_be_used_is_left_out(write, wrong, message):
 
 def test_what_the_user_says_must_not_contradict_the_file(write):
     path = write(function())
-    message = r"says that it holds accelerance \(acceleration \[m/s\^2\] per excitation force \[N\] in dataset 1\), not"
+    message = r"states accelerance \(acceleration \[m/s\^2\] per excitation force \[N\] in dataset 1\), not"
     with pytest.raises(FileContentError, match=message):
         read_uff(path, quantity="mobility")
     with pytest.raises(FileContentError, match=r"does not fit the response of mobility .*; give unit="):

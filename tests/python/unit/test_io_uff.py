@@ -121,7 +121,7 @@ def test_a_stated_unit_must_not_contradict_the_file_unless_forced(write):
     path = write(function(numerator=(12, "m/s^2")))
     with pytest.raises(FileContentError, match=r"unit of the FRFs is 'm/s\^2' / 'N', not the one of unit=; leave unit"):
         read_uff(path, unit="g/N")
-    with pytest.raises(FileContentError, match=r"says that it holds accelerance .*, not receptance"):
+    with pytest.raises(FileContentError, match=r"states accelerance .*, not receptance"):
         read_uff(path, unit="mm/N")
     with pytest.raises(ValueError, match="unit mm/N is one of receptance, not mobility"):
         read_uff(path, quantity="mobility", unit="mm/N")
