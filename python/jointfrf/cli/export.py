@@ -40,7 +40,7 @@ __all__ = [
 _OPTIONS = (
     ("full_matrix", "--full-matrix"),
     ("(bounds)", "(--bounds)"),
-    ("name the freq_hz at which it is taken", "name by --frequency HZ that at which it is taken"),
+    ("state one frequency by freq_hz", "state one frequency by --frequency HZ"),
     ("name one frequency by freq_hz", "name one frequency by --frequency HZ"),
     ("leave connector out", "leave --connector out"),
     ("and connector exclude", "and --connector exclude"),

@@ -294,8 +294,8 @@ class LawJoint:
             terms = law.constant_terms
             if terms is None and freq_hz is None:
                 raise ValueError(
-                    f"{type(law).__name__} of {','.join(dict.fromkeys(pair))} depends on frequency; name the freq_hz "
-                    "at which it is taken"
+                    f"{type(law).__name__} of {','.join(dict.fromkeys(pair))} depends on frequency; state one "
+                    "frequency by freq_hz"
                 )
             if terms is None:
                 at = law.stiffness(2 * np.pi * as_frequency([float(freq_hz or 0)]))[0]

@@ -220,11 +220,11 @@ def test_laws_are_exported_as_tables_that_a_straight_line_between_lines_meets(tm
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["ansys:1,2", "--frequency", "5:500"], "ansys has no tables over frequency: --frequency HZ names one"),
+        (["ansys:1,2", "--frequency", "5:500"], "no tables over frequency; name one frequency by --frequency HZ"),
         (["abaqus:1,2", "--frequency", "500:5"], "'500:5' is no band or frequency above 0 Hz"),
-        (["abaqus:1,2"], "depends on frequency: name by --frequency HZ that at which it is taken"),
-        (["nastran:1,2", "--frequency", "5", "--connector"], "are for abaqus, not for nastran: leave --connector out"),
-        (["abaqus:1,2", "--frequency", "5", "--connector"], "--frequency LOW:HIGH gives a table over frequency"),
+        (["abaqus:1,2"], "depends on frequency; state one frequency by --frequency HZ"),
+        (["nastran:1,2", "--frequency", "5", "--connector"], "are for abaqus, not for nastran; leave --connector out"),
+        (["abaqus:1,2", "--frequency", "5", "--connector"], "write a table over frequency by --frequency LOW:HIGH"),
     ],
 )  # fmt: skip
 def test_tables_that_cannot_be_written(tmp_path, words, message):
@@ -415,4 +415,4 @@ def test_a_wrong_part_by_modes_is_one_sentence(tmp_path):
     modes_of_b(tmp_path / "none.npz")
     result = run_command("frf", tmp_path / "modes.toml", *LINES, "--points", "9:y", "--output", tmp_path / "b.npz")
     assert result.returncode == 1
-    assert "there is no DOF '9:y'" in result.stderr
+    assert "unknown DOF '9:y'; use a DOF of the modes" in result.stderr

@@ -146,7 +146,7 @@ def test_a_joint_of_matrices_is_one_of_laws():
 
 def test_cards_say_what_they_cannot_represent():
     mount = jf.LawJoint({"y": LAWS["zener"]}, rigid=["x", "z"], mass={"x": 0.3, "y": 0.3, "z": 0.3})
-    with pytest.raises(ValueError, match="FractionalZener of y depends on frequency; name the freq_hz"):
+    with pytest.raises(ValueError, match="FractionalZener of y depends on frequency; state one frequency by freq_hz"):
         mount.export("abaqus", (1, 2))
     text = mount.export("abaqus", (1, 2), freq_hz=120.0)
     k = LAWS["zener"].stiffness(2 * np.pi * np.array([120.0]))[0]
