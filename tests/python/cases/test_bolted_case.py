@@ -5,6 +5,7 @@ import csv
 import dataclasses
 import io
 import json
+import re
 import shutil
 import warnings
 from functools import partial
@@ -210,7 +211,7 @@ def ran(tmp_path_factory):
 
 def test_the_command_runs_the_case(ran):
     assert ran.status == 0
-    assert ran.complained == ""
+    assert re.sub(r"jointfrf: 4\.3\.3-bolt: \d+ s\n", "", ran.complained) == ""  # progress
     assert ran.said.startswith("4.3.3-bolt: Bolted beams")
     for title in ("Preloaded contact", "Identified joint parameters", "Transfer to a beam B of 0.2 m"):
         assert f"\n{title}" in ran.said

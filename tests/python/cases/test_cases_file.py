@@ -84,7 +84,7 @@ SOLID_CHANGES = [
     ('preset = "seed"', 'preset = "fine"', r"\[substructure_a\]: preset must be one of seed, accurate, not 'fine'"),
     ("origin = [0.0, 0.0, 0.0]", "origin = [0.0, 0.0]", r"\[substructure_a\]: origin must be a list of 3 numbers, not"),
     ("poisson = 0.33", "poisson = 0.5", r"\[substructure_a\]: poisson must"),
-    ("position = 0.2875", "position = 0.3", r"\[substructure_a\]: the hole at 300 mm.* does not lie within the beam"),
+    ("position = 0.2875", "position = 0.3", r"\[substructure_a\]: the hole at 300 mm.* leaves the beam"),
     ("patch_radius", "patchradius", r"\[hole\]: unknown key 'patchradius'; use one of .*did you mean 'patch_radius'\?"),
     ("position = 0.2875, ", "", r"\[substructure_a\]: \[hole\]: the key 'position' is missing"),
     ('face = "top"', 'face = "left"', r"\[hole\]: face must be one of top, bottom.*, not 'left'"),

@@ -180,7 +180,7 @@ def test_a_file_that_cannot_be_read_leaves_the_others(tmp_path):
         ([LEVELS[0], *MODEL, "--j", "1", "--dofs", "y"], 2, "--j and --dofs are for fits without models"),
         ([LEVELS[0], *MODEL, "--damping", "both"], 2, "--damping is for fits without models"),
         ([LEVELS[0], "--model", "none.toml"], 1, "none.toml cannot be read"),
-        ([LEVELS[0], *MODEL, "--band", "5000:6000"], 1, "the band 5000 to 6000 Hz holds no frequency line"),
+        ([LEVELS[0], *MODEL, "--band", "5000:6000"], 1, "the band 5000 to 6000 Hz contains no frequency line"),
         ([LEVELS[0], LEVELS[1], *MODEL], 1, "; use --each if every file is a test of its own"),
         ([LEVELS[0], LEVELS[1], "--each", *MODEL, "--export", "nastran:1,2"], 2, "needs files; add --output"),
         ([*BARS, "--law", "y=sprung"], 2, "unknown law 'sprung'; use one of spring, standard-linear-solid"),

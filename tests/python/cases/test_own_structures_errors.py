@@ -148,7 +148,7 @@ def test_a_bad_npz_file(by_matrices, write, message):
         ),
         ("loss_factor = 0.01", "loss_factor = -1", r"loss_factor must be a number, at least 0, not -1$"),
         ("stiffness = ", "stifness = ", r"unknown key 'stifness'; use one of model, .*; did you mean 'stiffness'\?$"),
-        ('j = ["3:y", "3:theta"]', 'j = ["3:y", "3:y"]', r"\[points\]: the joint DOF '3:y' is named twice$"),
+        ('j = ["3:y", "3:theta"]', 'j = ["3:y", "3:y"]', r"joint DOF '3:y' is named twice; name each DOF once$"),
         ('j = ["3:y", "3:theta"]', 'j = ["3:y", "4:y"]', r"\[points\]: the model has no DOF '4:y'"),
     ],
 )

@@ -332,7 +332,7 @@ def test_windows_that_cannot_be_taken_off(h):
     with pytest.raises(ValueError, match="window_decay must not be negative, not -1"):
         jf.identify(FREQ, h, TRUE.dofs, window_decay=-1.0)
     laws = jf.LawJoint({"y": jf.SpringLaw(1e5), "theta": jf.SpringLaw(1e3)})
-    with pytest.raises(ValueError, match="springs and dampers, not of laws"):
+    with pytest.raises(ValueError, match="springs and dampers, not laws; leave out joint"):
         jf.identify(FREQ, h, joint=laws, window_decay=1.0)
 
 

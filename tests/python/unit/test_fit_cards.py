@@ -29,7 +29,7 @@ FIT = fit_of(
     {"k_y": 1e7, "k_theta_z": 5e3, "c_y": 200.0, "c_theta_z": 0.01},
     [1e4, 10.0, 5.0, 0.02],
     ["y", "theta_z"],
-    findings=(jf.Finding("residual", "warning", "the residual is high"),),
+    findings=(jf.Finding("residual-large", {"ratio": 1.5, "sigma": 9.0}),),
 )
 
 
@@ -39,7 +39,7 @@ def test_every_number_stands_in_a_comment():
     assert "method inverse-substructuring, 10 to 500 Hz, 50 lines" in text
     assert "$ k_y = 1e+07, 9.98e+06 .. 1.002e+07 N/m" in text
     assert "$ c_y = 200, 190.2 .. 209.8 N s/m" in text
-    assert "$ warning: the residual is high" in text
+    assert "warning: the residual is 1.50 times the noise, 9 sigma above it" in comments(text)
 
 
 def test_insignificant_damping_is_left_out_unless_asked():
