@@ -415,7 +415,7 @@ def test_paths_through_a_link_mean_what_the_system_means(tmp_path, monkeypatch):
             "--unit mm/N is one of receptance, not mobility",
         ),
         ({}, ["--unit", "V"], "argument --unit: unit 'V' of frf is not understood; use motion per force, such as g/N"),
-        ({"unit": "m/N"}, ["--quantity", "mobility"], "leave --quantity and --unit out, or give --unit and --force-quantity"),
+        ({"unit": "m/N"}, ["--quantity", "mobility"], "out, or give --unit and --force-quantity"),
         ({"h": np.ones((2, 2, 2)), "freq_hz": [1.0, 2.0], "more": 1}, [], "give --map axes=, such as freq,out,in"),
         ({"y": 1}, [], "has several fields for h; give --map h=... out of h, y"),
         ({"responses": None}, [], "have no names of responses; give --map responses=..., such as 1:x,2:x"),
