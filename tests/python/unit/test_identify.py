@@ -106,8 +106,9 @@ def test_damping_terms_that_the_data_support(beams):
 def test_a_coupled_joint(beams):
     coupled = jf.Joint([[6e5, 1e4], [1e4, 5e3]], [20, 1.5], ["y", "theta"])
     measured = jf.pollute(beams.gamma(coupled), 0.005, seed=1)
-    with pytest.warns(jf.IdentificationWarning, match=r"cross terms.*\[cross-terms-ignored\]"):
-        jf.identify(beams.freq, measured, ["y", "theta"])
+    with pytest.warns(jf.IdentificationWarning):
+        plain = jf.identify(beams.freq, measured, ["y", "theta"])
+    assert any("[cross-terms-ignored]" in text for text in plain.warnings)
     fit = jf.identify(beams.freq, measured, ["y", "theta"], cross="fit")
     assert not fit.warnings
     assert fit.value["k_y,theta"] == pytest.approx(1e4, rel=0.05)
