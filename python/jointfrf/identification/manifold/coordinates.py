@@ -21,7 +21,7 @@ from jointfrf.identification.minimise import inverse_information
 from jointfrf.identification.parameters import ParameterVector, joint_vector
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.kernel.call import call, call_for_number
-from jointfrf.kernel.linear_algebra import invert, solve
+from jointfrf.kernel.linear_algebra import invert
 from jointfrf.laws.law_joint import LawJoint
 
 __all__ = [
@@ -489,12 +489,10 @@ class LawCoordinates(JointCoordinates):
         Dynamic stiffness of the structure at the joint DOFs: stiffnesses are sought around it.
     shared : ndarray of int, shape (q,), optional
         The parameter that each of `joint` is, of points whose joints are equal; each its own by default.
-    springs : ndarray, shape (n,), optional
-        Reference springs Z, N/m or N m/rad; none by default.
 
     Notes
     -----
-    Entries are the upper triangle of R. Stiffnesses and times that cannot be negative are sought as logarithms.
+    Entries are the upper triangle of C. Stiffnesses and times that cannot be negative are sought as logarithms.
     """
 
     def __init__(
@@ -503,10 +501,8 @@ class LawCoordinates(JointCoordinates):
         omega: FloatArray,
         size: FloatArray,
         shared: NDArray[np.intp] | None = None,
-        springs: FloatArray | None = None,
     ) -> None:
         self.joint, self.omega, self.size, self.n = joint, omega, size, len(joint.dofs)
-        self.springs = np.zeros(self.n) if springs is None else springs
         self.shared = np.arange(len(joint.quantities)) if shared is None else shared
         first = np.unique(self.shared, return_index=True)[1].tolist()
         self.parameters = tuple(joint.quantities[i] for i in first)
@@ -524,14 +520,12 @@ class LawCoordinates(JointCoordinates):
         return np.asarray(np.bincount(self.shared, values) / np.bincount(self.shared))
 
     def compliance(self, x: FloatArray) -> ComplexArray:
-        """Return the upper triangle of R = (1 + C Z)^-1 C, shape (n_freq, n (n + 1)/2); NaN where K* is singular."""
+        """Return the upper triangle of C, shape (n_freq, n (n + 1)/2); NaN where K* is singular."""
         c = self._at(x).compliance(self.omega / (2 * np.pi), on_singular="nan")
-        if self.springs.any():
-            c = solve(np.eye(self.n) + c * self.springs, c, on_singular="nan")
         return np.ascontiguousarray(c[:, self.rows, self.columns])
 
     def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
-        """Return its derivatives by the coordinates, -R dK R, shape (n_freq, n (n + 1)/2, p)."""
+        """Return its derivatives by the coordinates, -C dK C, shape (n_freq, n (n + 1)/2, p)."""
         c = self.matrix(entries)
         slope = np.zeros((*entries.shape, x.size), np.complex128)
         for i, (places, by_value) in zip(self.shared, self._at(x).connection_slopes(self.omega), strict=True):
@@ -552,7 +546,7 @@ class LawCoordinates(JointCoordinates):
 
     def on_lines(self, lines: slice | NDArray[np.intp]) -> LawCoordinates:
         """Return the same on some of the lines."""
-        return LawCoordinates(self.joint, self.omega[lines], self.size, self.shared, self.springs)
+        return LawCoordinates(self.joint, self.omega[lines], self.size, self.shared)
 
     def theta(self, x: FloatArray) -> FloatArray:
         """Return the parameters."""

@@ -203,11 +203,9 @@ def estimate_laws(
         driving = abs(np.einsum("lpp->lp", gamma))
         # 1/(|gamma_jj| + |gamma_kk|) is a size of stiffness that FRFs can show.
         size = np.median(1 / np.maximum(driving[:, : dofs.size] + driving[:, dofs.size :], 1e-300), axis=0)
-        if all(a == b for a, b in own.laws):
-            lines = lines.with_springs()
         which, of_own = np.unique(shared[[names.index(name) for name in own.names]], return_inverse=True)
         _count_fitted(fitted, which, [one.name for one in quantities])
-        coordinates = LawCoordinates(own, omega, size, of_own.ravel(), lines.springs)
+        coordinates = LawCoordinates(own, omega, size, of_own.ravel())
         rigid = len(own.rigid)
         problem = GroupProblem(
             dofs, which, lines, coordinates,
@@ -238,7 +236,7 @@ def _near_springs(joint: LawJoint, lines: LineData, omega: FloatArray) -> list[F
     kinds, number = np.repeat(np.arange(3), len(pairs)), np.arange(3 * len(pairs))
     terms = JointTerms(parameters, omega, kinds, np.array(pairs * 3, np.intp), number)
     found = []
-    for x in _starts_of_lines(lines._replace(springs=None), terms):
+    for x in _starts_of_lines(lines, terms):
         k = terms.stiffness(x)
         laws = [law.started(omega, k[:, a, b]) for law, (a, b) in zip(joint.laws.values(), pairs, strict=True)]
         found.append(np.concatenate([law.values for law in laws]))
