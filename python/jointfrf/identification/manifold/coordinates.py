@@ -503,6 +503,7 @@ class LawCoordinates(JointCoordinates):
         shared: NDArray[np.intp] | None = None,
     ) -> None:
         self.joint, self.omega, self.size, self.n = joint, omega, size, len(joint.dofs)
+        self.springs = np.zeros(self.n)
         self.shared = np.arange(len(joint.quantities)) if shared is None else shared
         first = np.unique(self.shared, return_index=True)[1].tolist()
         self.parameters = tuple(joint.quantities[i] for i in first)

@@ -216,7 +216,7 @@ class JointCoordinates(ABC):
     is_stiffness: NDArray[np.bool_]
     in_compliance = False
     rate_of_one: FloatArray = np.zeros(0)
-    springs: FloatArray = np.zeros(0)
+    springs: FloatArray
 
     @property
     def names(self) -> tuple[str, ...]:
