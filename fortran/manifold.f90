@@ -96,8 +96,6 @@ module jointfrf_manifold
 contains
 
   !> The FRFs nearest to given ones that fit a joint, by Levenberg-Marquardt steps for H and Q on every line.
-  !> spring       Z, shape (n), N/m
-  !> spring       Z, shape (n), N/m
   !> gamma        FRFs at DOFs j, then k, shape (2 n, 2 n, n_freq), m/N
   !> inverse_std  weights of their entries, same shape, N/m; 0 where an entry is not used
   !> whitening    lower triangular factor that is applied to the weighted entries, shape (q, q, n_freq); of size 0 where
@@ -107,18 +105,19 @@ contains
   !> squares      weighted squares of the distance, shape (n_freq)
   !> steps        at most
   !> least_gain   a line has arrived when a step lowers its squares by no more
-  subroutine project_on_joint(transposed, reciprocal, steps, least_gain, spring, gamma, inverse_std, whitening, r, h, &
-                              q, squares, line_info, info)
+  !> spring       Z, shape (n), N/m; zero if absent
+  subroutine project_on_joint(transposed, reciprocal, steps, least_gain, gamma, inverse_std, whitening, r, h, q, &
+                              squares, line_info, info, spring)
     logical, intent(in) :: transposed, reciprocal
     integer(ip), intent(in) :: steps
     real(dp), intent(in) :: least_gain
     complex(dp), contiguous, target, intent(in) :: gamma(:, :, :), r(:, :, :)
-    real(dp), intent(in) :: spring(:)
     real(dp), contiguous, target, intent(in) :: inverse_std(:, :, :), whitening(:, :, :)
     complex(dp), contiguous, target, intent(inout) :: h(:, :, :), q(:, :, :)
     real(dp), contiguous, target, intent(out) :: squares(:)
     integer(ip), contiguous, target, intent(out) :: line_info(:)
     integer(ip), intent(out) :: info
+    real(dp), intent(in), optional :: spring(:)
     type(projection) :: work
     complex(dp), pointer, contiguous :: one_target(:, :, :, :)
     integer :: stat
@@ -129,7 +128,7 @@ contains
     work%free_q => q
     work%squares => squares
     one_target(1:size(gamma, 1), 1:size(gamma, 2), 1:size(gamma, 3), 1:1) => gamma
-    call make_manifold_plan(reciprocal, spring, .false., 1, size(whitening) > 0, work%plan, stat)
+    call make_manifold_plan(reciprocal, size(r, 1), .false., 1, size(whitening) > 0, work%plan, stat, spring)
     if (stat == 0) call set_data(work, transposed, one_target, inverse_std, whitening, r, h, q, line_info, stat)
     call run(work, 30.0_dp*steps, stat, info)
   end subroutine project_on_joint
@@ -138,16 +137,17 @@ contains
   !> 0 with given deviations, and the error of the FRFs is `share_of_noise` times their noise: least squares of both by
   !> one Gauss-Newton step. Off-diagonal entries of T are not in the prior.
   !> spread_m     standard deviations of the entries of M, shape (n, n, n_freq), > 0, N/m
-  !> spring, inverse_std, whitening, r, h, q    as in `project_on_joint`
-  subroutine expect_on_joint(transposed, reciprocal, share_of_noise, spread_m, spring, inverse_std, whitening, r, h, &
-                             q, line_info, info)
+  !> inverse_std, whitening, r, h, q, spring    as in `project_on_joint`
+  subroutine expect_on_joint(transposed, reciprocal, share_of_noise, spread_m, inverse_std, whitening, r, h, q, &
+                             line_info, info, spring)
     logical, intent(in) :: transposed, reciprocal
-    real(dp), intent(in) :: share_of_noise, spring(:)
+    real(dp), intent(in) :: share_of_noise
     real(dp), contiguous, target, intent(in) :: spread_m(:, :, :), inverse_std(:, :, :), whitening(:, :, :)
     complex(dp), contiguous, target, intent(in) :: r(:, :, :)
     complex(dp), contiguous, target, intent(inout) :: h(:, :, :), q(:, :, :)
     integer(ip), contiguous, target, intent(out) :: line_info(:)
     integer(ip), intent(out) :: info
+    real(dp), intent(in), optional :: spring(:)
     type(expectation) :: work
     complex(dp), target :: no_target(2*size(r, 1), 2*size(r, 1), size(line_info), 0)
     integer :: stat, k
@@ -156,7 +156,7 @@ contains
     work%free_h => h
     work%free_q => q
     work%spread_m(1:size(r, 1)**2, 1:size(line_info)) => spread_m
-    call make_manifold_plan(reciprocal, spring, .false., 1, size(whitening) > 0, work%plan, stat)
+    call make_manifold_plan(reciprocal, size(r, 1), .false., 1, size(whitening) > 0, work%plan, stat, spring)
     if (stat == 0) call set_data(work, transposed, no_target, inverse_std, whitening, r, h, q, line_info, stat)
     if (stat == 0) allocate (work%free(work%plan%n_free), stat=stat)
     if (stat == 0) then
@@ -172,25 +172,26 @@ contains
   !> Information that FRFs give on a joint about a point of the manifold, H and Q eliminated: with d the change of the
   !> free entries of R, the least squares over H and Q are, to second order, s - 2 Re(d^H p) + d^H W d.
   !> gamma        FRFs at DOFs j, then k, shape (2 n, 2 n, n_freq, n_target), m/N
-  !> spring, inverse_std, whitening, r    as in `project_on_joint`, the same for all targets
+  !> inverse_std, whitening, r, spring    as in `project_on_joint`, the same for all targets
   !> h, q         the point, shape (n, n, n_freq)
   !> information  W, shape (u, u, n_freq); free entries of R are the upper triangle row by row, or all
   !> gradient     p, shape (u, n_freq, n_target)
   !> squares      s, shape (n_freq, n_target)
-  subroutine joint_forms(transposed, reciprocal, spring, gamma, inverse_std, whitening, r, h, q, information, &
-                         gradient, squares, line_info, info)
+  subroutine joint_forms(transposed, reciprocal, gamma, inverse_std, whitening, r, h, q, information, gradient, &
+                         squares, line_info, info, spring)
     logical, intent(in) :: transposed, reciprocal
-    real(dp), intent(in) :: spring(:)
     complex(dp), contiguous, target, intent(in) :: gamma(:, :, :, :), r(:, :, :), h(:, :, :), q(:, :, :)
     real(dp), contiguous, target, intent(in) :: inverse_std(:, :, :), whitening(:, :, :)
     complex(dp), contiguous, target, intent(out) :: information(:, :, :), gradient(:, :, :)
     real(dp), contiguous, target, intent(out) :: squares(:, :)
     integer(ip), contiguous, target, intent(out) :: line_info(:)
     integer(ip), intent(out) :: info
+    real(dp), intent(in), optional :: spring(:)
     type(form_finding) :: work
     integer :: stat, i, t
 
-    call make_manifold_plan(reciprocal, spring, .true., size(gamma, 4), size(whitening) > 0, work%plan, stat)
+    call make_manifold_plan(reciprocal, size(r, 1), .true., size(gamma, 4), size(whitening) > 0, work%plan, stat, &
+                            spring)
     if (stat == 0) call set_data(work, transposed, gamma, inverse_std, whitening, r, h, q, line_info, stat)
     associate (plan => work%plan)
       if (stat == 0) allocate (work%result(plan%n_free**2), work%gradient_place(plan%n_free, plan%n_target), stat=stat)

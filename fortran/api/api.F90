@@ -678,8 +678,8 @@ contains
     call hold_traps(host)
     info = check_project_on_joint(trans, reciprocal, n, n_correlated, n_freq, steps, least_gain)
     if (info == info_good) then
-      call project_on_joint(is_transposed(trans), reciprocal == 1, steps, least_gain, spread(0.0_c_double, 1, int(n)), &
-                            gamma, inverse_std, whitening, c_joint, free_h, free_m, squares, line_info, info)
+      call project_on_joint(is_transposed(trans), reciprocal == 1, steps, least_gain, gamma, inverse_std, &
+                            whitening, c_joint, free_h, free_m, squares, line_info, info)
     end if
     call release_traps(host)
   end subroutine jf_project_on_joint
@@ -712,8 +712,8 @@ contains
     call hold_traps(host)
     info = check_expect_on_joint(trans, reciprocal, n, n_correlated, n_freq, share, spread_m)
     if (info == info_good) then
-      call expect_on_joint(is_transposed(trans), reciprocal == 1, share, spread_m, spread(0.0_c_double, 1, int(n)), &
-                           inverse_std, whitening, c_joint, free_h, free_m, line_info, info)
+      call expect_on_joint(is_transposed(trans), reciprocal == 1, share, spread_m, inverse_std, whitening, &
+                           c_joint, free_h, free_m, line_info, info)
     end if
     call release_traps(host)
   end subroutine jf_expect_on_joint
@@ -751,8 +751,8 @@ contains
     call hold_traps(host)
     info = check_joint_forms(trans, reciprocal, n, n_free, n_correlated, n_freq, n_target)
     if (info == info_good) then
-      call joint_forms(is_transposed(trans), reciprocal == 1, spread(0.0_c_double, 1, int(n)), gamma, inverse_std, &
-                       whitening, c_joint, free_h, free_m, information, gradient, squares, line_info, info)
+      call joint_forms(is_transposed(trans), reciprocal == 1, gamma, inverse_std, whitening, c_joint, free_h, &
+                       free_m, information, gradient, squares, line_info, info)
     end if
     call release_traps(host)
   end subroutine jf_joint_forms
@@ -789,8 +789,8 @@ contains
     info = check_project_on_joint(trans, reciprocal, n, n_correlated, n_freq, steps, least_gain)
     if (info == info_good) info = check_springs(spring, -8_ip)
     if (info == info_good) then
-      call project_on_joint(is_transposed(trans), reciprocal == 1, steps, least_gain, spring, gamma, inverse_std, &
-                            whitening, r_joint, free_h, free_q, squares, line_info, info)
+      call project_on_joint(is_transposed(trans), reciprocal == 1, steps, least_gain, gamma, inverse_std, &
+                            whitening, r_joint, free_h, free_q, squares, line_info, info, spring)
     end if
     call release_traps(host)
   end subroutine jf_project_with_springs
@@ -824,8 +824,8 @@ contains
     info = check_expect_on_joint(trans, reciprocal, n, n_correlated, n_freq, share, spread_m)
     if (info == info_good) info = check_springs(spring, -8_ip)
     if (info == info_good) then
-      call expect_on_joint(is_transposed(trans), reciprocal == 1, share, spread_m, spring, inverse_std, whitening, &
-                           r_joint, free_h, free_q, line_info, info)
+      call expect_on_joint(is_transposed(trans), reciprocal == 1, share, spread_m, inverse_std, whitening, &
+                           r_joint, free_h, free_q, line_info, info, spring)
     end if
     call release_traps(host)
   end subroutine jf_expect_with_springs
@@ -863,8 +863,8 @@ contains
     info = check_joint_forms(trans, reciprocal, n, n_free, n_correlated, n_freq, n_target)
     if (info == info_good) info = check_springs(spring, -8_ip)
     if (info == info_good) then
-      call joint_forms(is_transposed(trans), reciprocal == 1, spring, gamma, inverse_std, whitening, r_joint, free_h, &
-                       free_q, information, gradient, squares, line_info, info)
+      call joint_forms(is_transposed(trans), reciprocal == 1, gamma, inverse_std, whitening, r_joint, free_h, &
+                       free_q, information, gradient, squares, line_info, info, spring)
     end if
     call release_traps(host)
   end subroutine jf_forms_with_springs

@@ -165,9 +165,9 @@ contains
     integer, intent(in) :: steps
     integer(ip) :: line_info(lines), info
 
-    call project_on_joint(.false., s%reciprocal, int(steps, ip), gain, s%spring, s%gamma, s%w, s%whitening, &
+    call project_on_joint(.false., s%reciprocal, int(steps, ip), gain, s%gamma, s%w, s%whitening, &
         s%c, h, m, squares, &
-                          line_info, info)
+                          line_info, info, s%spring)
     call check(info == 0 .and. all(line_info == 0), 'good')
   end subroutine project
 
@@ -228,9 +228,9 @@ contains
     s = make_sample(n, reciprocal, correlated, spring)
     s%w = 1.0e4_dp*s%w
     allocate (information(s%n_free, s%n_free, lines), gradient(s%n_free, lines, 1))
-    call joint_forms(.false., reciprocal, s%spring, reshape(s%gamma, [2*n, 2*n, lines, 1]), s%w, s%whitening, &
+    call joint_forms(.false., reciprocal, reshape(s%gamma, [2*n, 2*n, lines, 1]), s%w, s%whitening, &
         s%c, s%h, s%m, &
-                     information, gradient, left, line_info, info)
+                     information, gradient, left, line_info, info, s%spring)
     call check(info == 0 .and. all(line_info == 0), 'forms: good')
     call check(all(left < 1.0e-12_dp), 'forms: no distance')
     d = 1.0e-6_dp*square(s)
@@ -273,7 +273,7 @@ contains
     h = s%h
     m = s%m
     m(n, 1, 4) = cmplx(not_a_number(), 0.0_dp, dp)
-    call expect_on_joint(.false., reciprocal, share, spread_m, s%spring, s%w, s%whitening, s%c, h, m, line_info, info)
+    call expect_on_joint(.false., reciprocal, share, spread_m, s%w, s%whitening, s%c, h, m, line_info, info, s%spring)
     call check(info == 1 .and. line_info(4) == -1 .and. count(line_info == 0) == lines - 1, 'expected: one bad line')
     call check(.not. abs(m(1, 1, 4)) <= huge(1.0_dp), 'expected: a bad line is NaN')
     h(:, :, 4) = s%h(:, :, 4)
@@ -423,9 +423,9 @@ contains
     call project(s, h, m, squares, 10)
     h_t = transposed(s%h)
     m_t = transposed(s%m)
-    call project_on_joint(.true., reciprocal, 10_ip, gain, s%spring, transposed(s%gamma), weights_t, factor_t, &
+    call project_on_joint(.true., reciprocal, 10_ip, gain, transposed(s%gamma), weights_t, factor_t, &
         transposed(s%c), &
-                          h_t, m_t, squares_t, line_info, info)
+                          h_t, m_t, squares_t, line_info, info, s%spring)
     call check_same(transposed(h_t), h, 'H, transposed')
     call check_same(transposed(m_t), m, 'M, transposed')
     call check_same(squares_t, squares, 'squares, transposed')
@@ -435,17 +435,17 @@ contains
     do i = 1, 2
       targets_t(:, :, :, i) = transposed(targets(:, :, :, i))
     end do
-    call joint_forms(.false., reciprocal, s%spring, targets, s%w, s%whitening, s%c, h, m, w, p, left, line_info, info)
-    call joint_forms(.true., reciprocal, s%spring, targets_t, weights_t, factor_t, transposed(s%c), h_t, m_t, &
+    call joint_forms(.false., reciprocal, targets, s%w, s%whitening, s%c, h, m, w, p, left, line_info, info, s%spring)
+    call joint_forms(.true., reciprocal, targets_t, weights_t, factor_t, transposed(s%c), h_t, m_t, &
         w_t, p_t, left_t, &
-                     line_info, info)
+                     line_info, info, s%spring)
     call check_same(transposed(w_t), w, 'W, transposed')
     call check_close(w, conjg(transposed(w)), 0.0_dp, 'W is Hermitian')
     call check_same(p_t, p, 'gradients do not depend on the order of storage')
     call check_same(left_t(:, 2), left(:, 2), 'squares of the second target')
-    call joint_forms(.false., reciprocal, s%spring, targets(:, :, :, 2:2), s%w, s%whitening, s%c, h, m, w_t, &
+    call joint_forms(.false., reciprocal, targets(:, :, :, 2:2), s%w, s%whitening, s%c, h, m, w_t, &
         p_t(:, :, :1), &
-                     left_t(:, :1), line_info, info)
+                     left_t(:, :1), line_info, info, s%spring)
     call check_close(p_t(:, :, 1:1), p(:, :, 2:2), 1.0e-10_dp, 'a target alone')
   end subroutine orders_of_storage
 
@@ -473,8 +473,8 @@ contains
     expected = 0
     expected([2, 3, 9, 10]) = -1
     expected(17) = -2
-    call project_on_joint(.false., .true., 10_ip, gain, s%spring, s%gamma, s%w, s%whitening, s%c, h, m, &
-        squares, line_info, info)
+    call project_on_joint(.false., .true., 10_ip, gain, s%gamma, s%w, s%whitening, s%c, h, m, &
+        squares, line_info, info, s%spring)
     call check(info == 5 .and. all(line_info == expected), 'bad lines')
     do i = 1, lines
       if (expected(i) == 0) then
@@ -487,9 +487,9 @@ contains
     end do
     m = s%m
     m(:, :, 17) = 1.0e200_dp
-    call joint_forms(.false., .true., s%spring, reshape(s%gamma, [2*n, 2*n, lines, 1]), s%w, s%whitening, s%c, &
+    call joint_forms(.false., .true., reshape(s%gamma, [2*n, 2*n, lines, 1]), s%w, s%whitening, s%c, &
         s%h, m, w, p, &
-                     left, line_info, info)
+                     left, line_info, info, s%spring)
     call check(info == 5 .and. all(line_info == expected), 'bad forms')
     do i = 1, lines
       call check(all(abs(w(:, :, i)) <= huge(1.0_dp) .eqv. expected(i) == 0) .and. &
@@ -514,9 +514,10 @@ contains
     one_h = s%h
     one_m = s%m
     do i = 1, lines
-      call project_on_joint(.false., .true., 300_ip, gain, s%spring, s%gamma(:, :, i:i), s%w(:, :, i:i), &
+      call project_on_joint(.false., .true., 300_ip, gain, s%gamma(:, :, i:i), s%w(:, :, i:i), &
           s%whitening, &
-                            s%c(:, :, i:i), one_h(:, :, i:i), one_m(:, :, i:i), one(i:i), line_info(i:i), info)
+                            s%c(:, :, i:i), one_h(:, :, i:i), one_m(:, :, i:i), one(i:i), line_info(i:i), info, &
+                            s%spring)
     end do
     call check_same(one_h, h, 'H of a line alone')
     call check_same(one_m, m, 'M of a line alone')
@@ -548,11 +549,11 @@ contains
     integer(ip) :: line_info(0), info
 
     info = 5
-    call project_on_joint(.true., .true., 3_ip, gain, [0.0_dp], gamma, weights, factor, a, a, a, squares, &
+    call project_on_joint(.true., .true., 3_ip, gain, gamma, weights, factor, a, a, a, squares, &
         line_info, info)
     call check(info == 0, 'no lines')
     info = 5
-    call joint_forms(.true., .true., [0.0_dp], reshape(gamma, [2, 2, 0, 1]), weights, factor, a, a, a, w, p, &
+    call joint_forms(.true., .true., reshape(gamma, [2, 2, 0, 1]), weights, factor, a, a, a, w, p, &
         left, line_info, &
                      info)
     call check(info == 0, 'no lines, forms')
