@@ -309,7 +309,7 @@ def _check_options(args: argparse.Namespace, frfs: FrfSet, table: object) -> Non
     needs = {
         "--j": (args.j, "the nodes on side j of the joint, such as --j 101,102"),
         "--k": (args.k, "the nodes on side k of the joint, such as --k 201,202"),
-        "--dofs": (args.dofs, "the DOFs of the joint, such as --dofs y,theta_z"),
+        "--dofs": (args.dofs, "the DOFs of the joint, such as --dofs y,rz"),
     }
     missing = [name for name, (value, _) in needs.items() if value is None]
     if table is not None:
