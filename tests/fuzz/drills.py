@@ -140,7 +140,7 @@ def disk_full(count: int, found: Found) -> None:
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             subprocess.run([sys.executable, "-c", _WRITER, name, "2"], check=True, stdout=subprocess.DEVNULL)
-            before = {path.name: path.read_bytes() for path in folder.iterdir()}
+            before = _files(folder)
             most = int(random.integers(1, min(len(content) for content in before.values())))
             command = [sys.executable, "-c", _WRITER.replace("range(1, n)", "range(2, n)"), name, "4"]
             done = subprocess.run(
@@ -149,7 +149,7 @@ def disk_full(count: int, found: Found) -> None:
             last = (done.stderr.strip().splitlines() or [""])[-1]
             if done.returncode == 0 or "OSError" not in last:
                 found.broken.append(f"no room after {most} bytes: status {done.returncode}, {last!r}")
-            after = {path.name: path.read_bytes() for path in folder.iterdir()}
+            after = _files(folder)
             if after != before:
                 found.broken.append(f"no room after {most} bytes: {sorted(after)} differ from before")
             found.counts["no room, the old files are as they were"] += 1
@@ -159,6 +159,12 @@ def disk_full(count: int, found: Found) -> None:
     if done.returncode != 1 or len(done.stderr.strip().splitlines()) != 1:
         found.broken.append(f"cases > /dev/full: status {done.returncode}, {done.stderr!r}")
     found.counts["no room for what is printed, one sentence"] += 1
+
+
+def _files(folder: Path) -> dict[str, bytes]:
+    """Return the content of all files in a folder and in those below it."""
+    paths = (path for path in folder.rglob("*") if path.is_file())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in paths}
 
 
 def _limit_files(most: int) -> None:

@@ -230,7 +230,7 @@ class _Finished:
             self.end = self._beyond.pop(self.end)
 
     def __str__(self) -> str:
-        return f"lines 0 to {self.end - 1} of out are written" if self.end else "no lines are written for good"
+        return f"lines 0 to {self.end - 1} of out are written" if self.end else "no lines of out are complete"
 
 
 def _checked(operation: LineFunction, arrays: Mapping[str, ArrayLike], out: Any) -> _Sweep:
