@@ -105,7 +105,7 @@ contains
   !> squares      weighted squares of the distance, shape (n_freq)
   !> steps        at most
   !> least_gain   a line has arrived when a step lowers its squares by no more
-  !> spring       Z, shape (n), N/m; zero if absent
+  !> spring       Z, shape (n), N/m; of size 0 where there are none
   subroutine project_on_joint(transposed, reciprocal, steps, least_gain, gamma, inverse_std, whitening, r, h, q, &
                               squares, line_info, info, spring)
     logical, intent(in) :: transposed, reciprocal
@@ -117,7 +117,7 @@ contains
     real(dp), contiguous, target, intent(out) :: squares(:)
     integer(ip), contiguous, target, intent(out) :: line_info(:)
     integer(ip), intent(out) :: info
-    real(dp), intent(in), optional :: spring(:)
+    real(dp), intent(in) :: spring(:)
     type(projection) :: work
     complex(dp), pointer, contiguous :: one_target(:, :, :, :)
     integer :: stat
@@ -147,7 +147,7 @@ contains
     complex(dp), contiguous, target, intent(inout) :: h(:, :, :), q(:, :, :)
     integer(ip), contiguous, target, intent(out) :: line_info(:)
     integer(ip), intent(out) :: info
-    real(dp), intent(in), optional :: spring(:)
+    real(dp), intent(in) :: spring(:)
     type(expectation) :: work
     complex(dp), target :: no_target(2*size(r, 1), 2*size(r, 1), size(line_info), 0)
     integer :: stat, k
@@ -186,7 +186,7 @@ contains
     real(dp), contiguous, target, intent(out) :: squares(:, :)
     integer(ip), contiguous, target, intent(out) :: line_info(:)
     integer(ip), intent(out) :: info
-    real(dp), intent(in), optional :: spring(:)
+    real(dp), intent(in) :: spring(:)
     type(form_finding) :: work
     integer :: stat, i, t
 

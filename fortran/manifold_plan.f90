@@ -65,13 +65,13 @@ contains
   !> by_r        whether columns by R are wanted
   !> n_target    FRFs whose residuals are wanted
   !> correlated  whether columns are whitened by a triangular factor
-  !> spring      Z, shape (n), N/m; zero if absent
+  !> spring      Z, shape (n), N/m; of size 0 where there are none
   subroutine make_manifold_plan(reciprocal, n, by_r, n_target, correlated, plan, stat, spring)
     logical, intent(in) :: reciprocal, by_r, correlated
     integer, intent(in) :: n, n_target
     type(manifold_plan), intent(out) :: plan
     integer, intent(out) :: stat
-    real(dp), intent(in), optional :: spring(:)
+    real(dp), intent(in) :: spring(:)
 
     plan%reciprocal = reciprocal
     plan%n = n
@@ -80,13 +80,13 @@ contains
     plan%n_free = merge((n*(n + 1))/2, n*n, reciprocal)
     plan%n_entry = merge(n*(2*n + 1), 4*n*n, reciprocal)
     plan%n_column = 2*plan%n_free + merge(plan%n_free, 0, by_r) + n_target
-    if (present(spring)) plan%has_springs = any(spring > 0.0_dp)
+    plan%has_springs = any(spring > 0.0_dp)
     allocate (plan%spring(n), plan%row(plan%n_free), plan%column(plan%n_free), plan%gamma_row(plan%n_entry), &
               plan%gamma_column(plan%n_entry), plan%gamma(plan%n_entry), plan%in_rows(plan%n_entry), plan%kk_first(n), &
               plan%groups(number_of_groups(plan)), stat=stat)
     if (stat /= 0) return
     plan%spring(:) = 0.0_dp
-    if (present(spring)) plan%spring(:) = spring
+    if (plan%has_springs) plan%spring(:) = spring
     call list_triangle(reciprocal, n, plan%row, plan%column)
     call place_elements(plan, by_r)
     call list_entries(plan, stat)

@@ -117,6 +117,9 @@ module jointfrf
   integer(ip), parameter, public :: jf_engine_x86_64_v3 = engine_v3
   integer(ip), parameter, public :: jf_engine_x86_64_v4 = engine_v4
 
+  !> No reference springs.
+  real(c_double), parameter :: no_springs(0) = [real(c_double) ::]
+
 contains
 
   ! Bounds are computed before sizes are checked: MIN and MAX in them keep those that will be refused from overflowing.
@@ -679,7 +682,7 @@ contains
     info = check_project_on_joint(trans, reciprocal, n, n_correlated, n_freq, steps, least_gain)
     if (info == info_good) then
       call project_on_joint(is_transposed(trans), reciprocal == 1, steps, least_gain, gamma, inverse_std, &
-                            whitening, c_joint, free_h, free_m, squares, line_info, info)
+                            whitening, c_joint, free_h, free_m, squares, line_info, info, no_springs)
     end if
     call release_traps(host)
   end subroutine jf_project_on_joint
@@ -713,7 +716,7 @@ contains
     info = check_expect_on_joint(trans, reciprocal, n, n_correlated, n_freq, share, spread_m)
     if (info == info_good) then
       call expect_on_joint(is_transposed(trans), reciprocal == 1, share, spread_m, inverse_std, whitening, &
-                           c_joint, free_h, free_m, line_info, info)
+                           c_joint, free_h, free_m, line_info, info, no_springs)
     end if
     call release_traps(host)
   end subroutine jf_expect_on_joint
@@ -752,7 +755,7 @@ contains
     info = check_joint_forms(trans, reciprocal, n, n_free, n_correlated, n_freq, n_target)
     if (info == info_good) then
       call joint_forms(is_transposed(trans), reciprocal == 1, gamma, inverse_std, whitening, c_joint, free_h, &
-                       free_m, information, gradient, squares, line_info, info)
+                       free_m, information, gradient, squares, line_info, info, no_springs)
     end if
     call release_traps(host)
   end subroutine jf_joint_forms

@@ -550,12 +550,11 @@ contains
 
     info = 5
     call project_on_joint(.true., .true., 3_ip, gain, gamma, weights, factor, a, a, a, squares, &
-        line_info, info)
+                          line_info, info, [real(dp) ::])
     call check(info == 0, 'no lines')
     info = 5
     call joint_forms(.true., .true., reshape(gamma, [2, 2, 0, 1]), weights, factor, a, a, a, w, p, &
-        left, line_info, &
-                     info)
+                     left, line_info, info, [real(dp) ::])
     call check(info == 0, 'no lines, forms')
   end subroutine nothing
 end program test_manifold
