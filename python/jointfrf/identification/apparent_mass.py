@@ -132,13 +132,15 @@ class ApparentScale:
 
 
 def common_factor(ratio: float, error: float = 0.0) -> str | None:
-    """Return what would explain a ratio of masses, apparent over true: a unit, with its factor; None if nothing."""
+    """Return what would explain a ratio of masses, apparent over true: units, each with its factor; None if nothing."""
     near = np.log1p(max(error, _NEAR))
-    for power in (1, -1):
-        for factor, words in _FACTORS.items():
-            if abs(np.log(ratio) - power * np.log(factor)) < near:
-                return f"a factor of {factor**power:.4g} ({words}{'' if power > 0 else ', the other way round'})"
-    return None
+    causes = [
+        f"a factor of {factor**power:.4g} ({words}{'' if power > 0 else ', the other way round'})"
+        for power in (1, -1)
+        for factor, words in _FACTORS.items()
+        if abs(np.log(ratio) - power * np.log(factor)) < near
+    ]
+    return " or ".join(causes) or None
 
 
 def apparent_scale(

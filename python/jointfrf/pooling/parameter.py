@@ -272,11 +272,6 @@ def shown_chance(p_value: float) -> str:
     return f"{p_value:.2g}" if p_value >= 1e-4 else "< 1e-4"
 
 
-def _p_value(p_value: float) -> str:
-    shown = shown_chance(p_value)
-    return shown if shown.startswith("<") else f"= {shown}"
-
-
 def _findings(pooled: PooledParameter) -> list[Finding]:
     found = []
     if pooled.outlying:

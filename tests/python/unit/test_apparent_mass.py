@@ -111,6 +111,12 @@ def test_common_factors_are_named(factor, words):
     assert words in common_factor(1.03 * factor)
 
 
+def test_all_factors_that_would_explain_a_ratio_are_named():
+    both = common_factor(39.4)
+    assert "lengths in inches" in both
+    assert "rad/s called Hz" in both
+
+
 @pytest.mark.parametrize("factor", [1.0, 2.0, 3.0, 6.5, 60.0])
 def test_other_factors_are_not(factor):
     assert common_factor(factor) is None
