@@ -3,6 +3,9 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#ifdef _WIN32
+#include <windows.h>
+#endif
 
 /* 2, 3 or 4 for x86-64-v2, -v3 or -v4; 0 for less and for other processors. The operating system's support of the wide
    registers is part of the answer. */
@@ -42,10 +45,16 @@ void jointfrf_prefetch(intptr_t from, intptr_t to, int write)
 #endif
 }
 
+/* On Windows each C library has a copy of the environment of its own; that of the process is what the others write to. */
 void jointfrf_read_engine(int length, char *word)
 {
+#ifdef _WIN32
+  char value[32];
+  const size_t used = GetEnvironmentVariableA("JOINTFRF_ENGINE", value, sizeof value);
+#else
   const char *value = getenv("JOINTFRF_ENGINE");
   const size_t used = value == NULL ? 0 : strlen(value);
+#endif
 
   memset(word, used > (size_t)length ? '?' : ' ', (size_t)length);
   if (used > 0 && used <= (size_t)length)

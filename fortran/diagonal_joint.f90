@@ -18,7 +18,8 @@ module jointfrf_diagonal_joint
   use jointfrf_status, only: info_good, info_no_memory
   implicit none
   private
-  public :: diagonal_joint, fit_diagonal_joint, line_forms, search_limits
+  public :: diagonal_joint, line_forms, search_limits
+  public :: fit_diagonal_joint, lowest_diagonal_joint, rate_of_one, set_limits
 
   !> Their sums are counted by default integers, with room to spare.
   integer, parameter, public :: most_dofs = 1000
@@ -30,6 +31,12 @@ module jointfrf_diagonal_joint
   real(dp), parameter :: least_lowered = 1.0e-12_dp, least_raised = 1.0e-6_dp, largest_damping = 1.0e10_dp
   !> Squares are the same to rounding within this share; with that of a residual the least gain grows in long sums.
   real(dp), parameter :: rounding = 1.0e-13_dp, share_of_cost = 1.0e-6_dp
+
+  !> Largest rate of damping, in units of that at which damping is as large as stiffness on the highest line: the joint
+  !> is then damping only. Share of it from which on a DOF is all damping.
+  real(dp), parameter :: largest_rate = 100.0_dp, all_damping = 0.1_dp
+  !> Minima from other starts are compared to this, in squares of one residual.
+  real(dp), parameter :: coarse = 1.0e-2_dp
 
   !> Which terms the joint has.
   type :: diagonal_joint
@@ -95,21 +102,25 @@ contains
   !> normal    Re(J^H W J) of all lines there, half the second derivative
   !> descent   Re(J^H r) there, half of what the squares fall by
   !> cost      the squares; +Inf where they are not finite where the search begins, and x stays
-  subroutine fit_diagonal_joint(joint, forms, limits, x, normal, descent, cost, info)
+  !> steps     in place of those of the limits
+  subroutine fit_diagonal_joint(joint, forms, limits, x, normal, descent, cost, info, steps)
     type(diagonal_joint), intent(in) :: joint
     type(line_forms), intent(in) :: forms
     type(search_limits), intent(in) :: limits
     real(dp), intent(inout) :: x(:)
     real(dp), intent(out) :: normal(:, :), descent(:), cost
     integer(ip), intent(out) :: info
+    integer, intent(in), optional :: steps
     type(form_sums), target :: sums
     type(evaluation) :: here, there
     type(step_space) :: space
     real(dp) :: damping
     logical :: found
-    integer :: step, small, i
+    integer :: step, most_steps, small, i
 
     info = info_good
+    most_steps = limits%steps
+    if (present(steps)) most_steps = steps
     call find_kernels(sums%kernels, found, info)
     if (info == info_good) call prepare_search(size(x), here, there, space, info)
     if (info == info_good) call prepare(joint, forms, sums, info)
@@ -121,7 +132,7 @@ contains
     call evaluate(joint, sums, x, here)
     damping = first_damping
     small = 0
-    do step = 1, limits%steps
+    do step = 1, most_steps
       call take_step(joint, sums, limits, damping, x, here, there, space, found)
       if (.not. found) exit
       small = merge(small + 1, 0, here%cost - there%cost <= limits%least_gain*max(1.0_dp, share_of_cost*there%cost))
@@ -136,6 +147,128 @@ contains
     descent = here%descent
     cost = here%cost
   end subroutine fit_diagonal_joint
+
+  !> Minimise; where a DOF ends rigid or all damping, also from no damping and from some.
+  !> A compliance and its rate are a vector in polar coordinates: at a = 0 nothing moves the rate any more, not even
+  !> from the wrong sign of damping. The first n parameters are the compliances, DOF by DOF.
+  subroutine lowest_diagonal_joint(joint, forms, limits, x, normal, descent, cost, info)
+    type(diagonal_joint), intent(in) :: joint
+    type(line_forms), intent(in) :: forms
+    type(search_limits), intent(in) :: limits
+    real(dp), intent(inout) :: x(:)
+    real(dp), intent(out) :: normal(:, :), descent(:), cost
+    integer(ip), intent(out) :: info
+    type(search_limits) :: rough
+    type(evaluation) :: best, there
+    real(dp), allocatable :: x_best(:), x_there(:)
+    logical, allocatable :: caught(:)
+    real(dp) :: held_value
+    integer :: p, start, stat
+
+    p = size(x)
+    allocate (best%normal(p, p), best%descent(p), there%normal(p, p), there%descent(p), x_best(p), x_there(p), &
+              caught(joint%n), rough%lower(p), rough%upper(p), stat=stat)
+    info = info_good
+    if (stat /= 0) info = info_no_memory
+    if (stat /= 0) return
+    held_value = 0.0_dp
+    if (limits%held > 0) held_value = x(limits%held)
+    x_best(:) = x
+    call fit_diagonal_joint(joint, forms, limits, x_best, best%normal, best%descent, best%cost, info)
+    if (info /= info_good) return
+    caught = .false.
+    if (p > joint%n .and. size(forms%omega) > 0) call find_caught(joint, forms%omega, x_best, caught)
+    rough%steps = limits%steps
+    rough%held = limits%held
+    rough%least_gain = max(limits%least_gain, coarse)
+    rough%lower(:) = limits%lower
+    rough%upper(:) = limits%upper
+    do start = 0, 1
+      if (.not. any(caught)) exit
+      x_there(:) = x_best
+      call start_again(joint, forms, caught, real(start, dp), limits%held, held_value, x_there)
+      call fit_diagonal_joint(joint, forms, rough, x_there, there%normal, there%descent, there%cost, info)
+      if (info /= info_good) return
+      if (.not. there%cost < best%cost - coarse) cycle
+      x_best(:) = x_there
+      call fit_diagonal_joint(joint, forms, limits, x_best, best%normal, best%descent, best%cost, info)
+      if (info /= info_good) return
+    end do
+    x = x_best
+    normal = best%normal
+    descent = best%descent
+    cost = best%cost
+  end subroutine lowest_diagonal_joint
+
+  !> Which DOFs are rigid or all damping.
+  pure subroutine find_caught(joint, omega, x, caught)
+    type(diagonal_joint), intent(in) :: joint
+    real(dp), intent(in) :: omega(:), x(:)
+    logical, intent(out) :: caught(:)
+    real(dp) :: rate
+    integer :: i
+
+    caught = x(:joint%n) <= 0.0_dp
+    do i = joint%n + 1, size(x)
+      rate = abs(x(i))
+      if (.not. joint%by_rate) rate = rate*x(joint%dof(i))
+      if (rate > all_damping*largest_rate*rate_of_one(joint%kind(i), omega)) caught(joint%dof(i)) = .true.
+    end do
+  end subroutine find_caught
+
+  !> Parameters of the DOFs that are caught as if C were as large as in the forms, with a share of as much damping.
+  subroutine start_again(joint, forms, caught, share, held, held_value, x)
+    type(diagonal_joint), intent(in) :: joint
+    type(line_forms), intent(in) :: forms
+    logical, intent(in) :: caught(:)
+    real(dp), intent(in) :: share, held_value
+    integer, intent(in) :: held
+    real(dp), intent(inout) :: x(:)
+    integer :: d, i, k
+
+    do d = 1, joint%n
+      if (.not. caught(d)) cycle
+      x(d) = 0.0_dp
+      do k = 1, size(forms%squares)
+        x(d) = x(d) + abs(forms%c_joint(d, k))
+      end do
+      x(d) = x(d)/size(forms%squares)
+    end do
+    if (held > 0) x(held) = held_value
+    do i = joint%n + 1, size(x)
+      if (i == held .or. .not. caught(joint%dof(i))) cycle
+      x(i) = share*rate_of_one(joint%kind(i), forms%omega)
+      if (.not. joint%by_rate) x(i) = x(i)/max(x(joint%dof(i)), tiny(1.0_dp))
+    end do
+  end subroutine start_again
+
+  !> Rate eta or tau at which damping is as large as stiffness on the highest line.
+  pure real(dp) function rate_of_one(kind, omega)
+    integer, intent(in) :: kind
+    real(dp), intent(in) :: omega(:)
+
+    rate_of_one = 1.0_dp
+    if (kind == 2) rate_of_one = 1/max(maxval(omega), tiny(1.0_dp))
+  end function rate_of_one
+
+  !> Limits of the parameters: compliances are not negative, rates not beyond the largest.
+  subroutine set_limits(joint, omega, limits, stat)
+    type(diagonal_joint), intent(in) :: joint
+    real(dp), intent(in) :: omega(:)
+    type(search_limits), intent(inout) :: limits
+    integer, intent(out) :: stat
+    integer :: i
+
+    allocate (limits%lower(size(joint%kind)), limits%upper(size(joint%kind)), stat=stat)
+    if (stat /= 0) return
+    limits%upper(:) = ieee_value(1.0_dp, ieee_positive_inf)
+    limits%lower(:) = 0.0_dp
+    do i = 1, size(joint%kind)
+      if (joint%kind(i) == 0) cycle
+      if (joint%by_rate) limits%upper(i) = largest_rate*rate_of_one(joint%kind(i), omega)
+      limits%lower(i) = -limits%upper(i)
+    end do
+  end subroutine set_limits
 
   !> Memory of a search for n_par parameters.
   subroutine prepare_search(n_par, here, there, space, info)

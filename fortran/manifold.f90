@@ -17,7 +17,7 @@ module jointfrf_manifold
   use jointfrf_kinds, only: dp, ip, long
   use jointfrf_lanes, only: lane_kernels, lanes, real_lines, to_register
   use jointfrf_line_layout, only: store_nan
-  use jointfrf_manifold_plan, only: make_manifold_plan, manifold_plan
+  use jointfrf_manifold_plan, only: by_all, by_diagonal, by_none, make_manifold_plan, manifold_plan
   use jointfrf_sharing, only: serial_flops_lanes, share, shared_work, threads_for
   use jointfrf_status, only: info_good, info_no_memory, line_good, line_not_finite, line_overflow
   implicit none
@@ -96,7 +96,8 @@ module jointfrf_manifold
 contains
 
   !> The FRFs nearest to given ones that fit a joint, by Levenberg-Marquardt steps for H and Q on every line.
-  !> gamma        FRFs at DOFs j, then k, shape (2 n, 2 n, n_freq), m/N
+  !> gamma        FRFs at DOFs j, then k, shape (2 n, 2 n, n_freq), m/N; or packed, the entries that are read row by
+  !>              row, shape (q, 1, n_freq)
   !> inverse_std  weights of their entries, same shape, N/m; 0 where an entry is not used
   !> whitening    lower triangular factor that is applied to the weighted entries, shape (q, q, n_freq); of size 0 where
   !>              there is none. Entries are counted row by row, of a reciprocal structure from the diagonal on.
@@ -128,7 +129,7 @@ contains
     work%free_q => q
     work%squares => squares
     one_target(1:size(gamma, 1), 1:size(gamma, 2), 1:size(gamma, 3), 1:1) => gamma
-    call make_manifold_plan(reciprocal, size(r, 1), .false., 1, size(whitening) > 0, work%plan, stat, spring)
+    call make_manifold_plan(reciprocal, size(r, 1), by_none, 1, size(whitening) > 0, work%plan, stat, spring)
     if (stat == 0) call set_data(work, transposed, one_target, inverse_std, whitening, r, h, q, line_info, stat)
     call run(work, 30.0_dp*steps, stat, info)
   end subroutine project_on_joint
@@ -149,14 +150,14 @@ contains
     integer(ip), intent(out) :: info
     real(dp), intent(in) :: spring(:)
     type(expectation) :: work
-    complex(dp), target :: no_target(2*size(r, 1), 2*size(r, 1), size(line_info), 0)
+    complex(dp), target :: no_target(size(inverse_std, 1), size(inverse_std, 2), size(line_info), 0)
     integer :: stat, k
 
     work%share = share_of_noise
     work%free_h => h
     work%free_q => q
     work%spread_m(1:size(r, 1)**2, 1:size(line_info)) => spread_m
-    call make_manifold_plan(reciprocal, size(r, 1), .false., 1, size(whitening) > 0, work%plan, stat, spring)
+    call make_manifold_plan(reciprocal, size(r, 1), by_none, 1, size(whitening) > 0, work%plan, stat, spring)
     if (stat == 0) call set_data(work, transposed, no_target, inverse_std, whitening, r, h, q, line_info, stat)
     if (stat == 0) allocate (work%free(work%plan%n_free), stat=stat)
     if (stat == 0) then
@@ -174,12 +175,13 @@ contains
   !> gamma        FRFs at DOFs j, then k, shape (2 n, 2 n, n_freq, n_target), m/N
   !> inverse_std, whitening, r, spring    as in `project_on_joint`, the same for all targets
   !> h, q         the point, shape (n, n, n_freq)
-  !> information  W, shape (u, u, n_freq); free entries of R are the upper triangle row by row, or all
+  !> information  W, shape (u, u, n_freq); free entries of R are the upper triangle row by row, or all. With `diagonal`
+  !>              u is n, and d the change of the diagonal of R alone.
   !> gradient     p, shape (u, n_freq, n_target)
   !> squares      s, shape (n_freq, n_target)
-  subroutine joint_forms(transposed, reciprocal, gamma, inverse_std, whitening, r, h, q, information, gradient, &
-                         squares, line_info, info, spring)
-    logical, intent(in) :: transposed, reciprocal
+  subroutine joint_forms(transposed, reciprocal, diagonal, gamma, inverse_std, whitening, r, h, q, information, &
+                         gradient, squares, line_info, info, spring)
+    logical, intent(in) :: transposed, reciprocal, diagonal
     complex(dp), contiguous, target, intent(in) :: gamma(:, :, :, :), r(:, :, :), h(:, :, :), q(:, :, :)
     real(dp), contiguous, target, intent(in) :: inverse_std(:, :, :), whitening(:, :, :)
     complex(dp), contiguous, target, intent(out) :: information(:, :, :), gradient(:, :, :)
@@ -190,16 +192,17 @@ contains
     type(form_finding) :: work
     integer :: stat, i, t
 
-    call make_manifold_plan(reciprocal, size(r, 1), .true., size(gamma, 4), size(whitening) > 0, work%plan, stat, &
-                            spring)
+    call make_manifold_plan(reciprocal, size(r, 1), merge(by_diagonal, by_all, diagonal), size(gamma, 4), &
+                            size(whitening) > 0, work%plan, stat, spring)
     if (stat == 0) call set_data(work, transposed, gamma, inverse_std, whitening, r, h, q, line_info, stat)
     associate (plan => work%plan)
-      if (stat == 0) allocate (work%result(plan%n_free**2), work%gradient_place(plan%n_free, plan%n_target), stat=stat)
+      if (stat == 0) allocate (work%result(plan%n_joint**2), work%gradient_place(plan%n_joint, plan%n_target), &
+                               stat=stat)
       if (stat == 0) then
-        call list_square(transposed, plan%n_free, plan%result, work%result)
+        call list_square(transposed, plan%n_joint, plan%result, work%result)
         do t = 1, plan%n_target
-          do i = 1, plan%n_free
-            work%gradient_place(i, t) = plan%normal + (plan%n_free + t - 1)*(plan%n_column - 2*plan%n_free) + i
+          do i = 1, plan%n_joint
+            work%gradient_place(i, t) = plan%normal + (plan%n_joint + t - 1)*(plan%n_column - 2*plan%n_free) + i
           end do
         end do
       end if
@@ -233,11 +236,12 @@ contains
     real(dp), contiguous, target, intent(in) :: inverse_std(:, :, :), whitening(:, :, :)
     integer(ip), contiguous, target, intent(inout) :: line_info(:)
     integer, intent(out) :: stat
-    integer :: n, e, t
+    integer :: n, n_given, e, t
 
     n = work%plan%n
+    n_given = size(inverse_std, 1)*size(inverse_std, 2)
     work%transposed = transposed
-    allocate (work%weight(work%plan%n_entry), work%target(4*n*n, work%plan%n_target), work%square(n*n, 5), &
+    allocate (work%weight(work%plan%n_entry), work%target(n_given, work%plan%n_target), work%square(n*n, 5), &
               work%of_targets(work%plan%n_entry*size(gamma, 4)), stat=stat)
     if (stat /= 0) return
     work%target = work%plan%unused + 4
@@ -245,6 +249,13 @@ contains
       associate (row => work%plan%gamma_row(e), column => work%plan%gamma_column(e))
         work%weight(e) = merge(column + (row - 1)*2*n, row + (column - 1)*2*n, transposed)
       end associate
+    end do
+    if (size(inverse_std, 2) == 1) then                    ! packed: entry in_rows(i) is number i
+      do e = 1, work%plan%n_entry
+        work%weight(work%plan%in_rows(e)) = e
+      end do
+    end if
+    do e = 1, work%plan%n_entry
       do t = 1, work%plan%n_target
         work%target(work%weight(e), t) = work%plan%target + (t - 1)*work%plan%n_entry + e
       end do
@@ -258,11 +269,11 @@ contains
     call list_square(transposed, n, work%plan%best_h, work%square(:, at_best_h))
     call list_square(transposed, n, work%plan%best_q, work%square(:, at_best_q))
     work%n_target = size(gamma, 4)
-    if (work%n_target > 0) call c_f_pointer(c_loc(gamma), work%gamma, [2, 4*n*n, size(gamma, 3), size(gamma, 4)])
+    if (work%n_target > 0) call c_f_pointer(c_loc(gamma), work%gamma, [2, n_given, size(gamma, 3), size(gamma, 4)])
     work%r => real_lines(r)
     work%h => real_lines(h)
     work%q => real_lines(q)
-    work%inverse_std(1:4*n*n, 1:size(inverse_std, 3)) => inverse_std
+    work%inverse_std(1:n_given, 1:size(inverse_std, 3)) => inverse_std
     work%whitening => whitening
     work%line_info => line_info
   end subroutine set_data
@@ -380,7 +391,7 @@ contains
     call load_square(self%h, self%square(:, at_h))
     call load_square(self%q, self%square(:, at_q))
     do t = 1, self%n_target
-      call self%kernels%load(4*n2, self%target(:, t), first, n_lines, self%gamma(:, :, :, t), space%x)
+      call self%kernels%load(size(self%target, 1), self%target(:, t), first, n_lines, self%gamma(:, :, :, t), space%x)
       associate (data => space%x(:, :, self%plan%target + (t - 1)*q + 1:self%plan%target + t*q))
         do e = 1, q
           do l = 1, lanes
@@ -470,7 +481,7 @@ contains
     real(dp) :: total(lanes), of_gradient(lanes)
     integer :: u, t, l, line
 
-    u = self%plan%n_free
+    u = self%plan%n_joint
     call self%kernels%joint_form(self%plan, space%w, space%whitening, space%x, space%squares)
     call self%kernels%store(u*u, self%result, first, n_lines, space%x, self%information_pairs)
     call self%kernels%total(u*u, self%result, space%x, total)

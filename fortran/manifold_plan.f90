@@ -15,6 +15,9 @@ module jointfrf_manifold_plan
   private
   public :: make_manifold_plan
 
+  !> Entries of R by which columns are asked for: none, those of its diagonal, all that are free.
+  integer, parameter, public :: by_none = 0, by_diagonal = 1, by_all = 2
+
   !> Entries first + 1 .. first + n, and the columns that are not zero there, ascending.
   type, public :: entry_group
     integer :: first = 0, n = 0
@@ -26,7 +29,8 @@ module jointfrf_manifold_plan
     integer :: n = 0                       !< joint DOFs
     integer :: n_free = 0                  !< free entries of H, of Q and of R
     integer :: n_entry = 0                 !< entries of gamma
-    integer :: n_column = 0                !< columns: by H, by Q, then by R where asked for, then residuals
+    integer :: n_joint = 0                 !< entries of R by which columns are asked for
+    integer :: n_column = 0                !< columns: by H, by Q, by those entries of R, then residuals
     integer :: n_target = 1                !< residuals
     logical :: correlated = .false.        !< whether columns are whitened by a triangular factor
     integer :: n_element = 0               !< elements that all this takes
@@ -48,9 +52,10 @@ module jointfrf_manifold_plan
     integer :: columns = 0                 !< columns, one run of entries each
     integer :: whitened = 0                !< the same whitened; where that changes nothing, the same place
     integer :: normal = 0                  !< products of columns, row by row; n_column elements a row
-    integer :: result = 0                  !< n_free by n_free, row by row
+    integer :: result = 0                  !< n_joint by n_joint, row by row
     integer :: unused = 0                  !< elements that nobody reads
     integer, allocatable :: row(:), column(:)        !< of each free entry
+    integer, allocatable :: joint(:)       !< the free entry that each of R is by which there is a column
     integer, allocatable :: gamma_row(:), gamma_column(:)      !< of each entry of gamma
     integer, allocatable :: gamma(:)       !< the element where each entry of gamma is computed
     integer, allocatable :: in_rows(:)     !< the entry that is number i of the matrix gamma row by row
@@ -62,16 +67,17 @@ module jointfrf_manifold_plan
 contains
 
   !> Plan for n joint DOFs.
-  !> by_r        whether columns by R are wanted
+  !> by_r        by which entries of R there are columns
   !> n_target    FRFs whose residuals are wanted
   !> correlated  whether columns are whitened by a triangular factor
   !> spring      Z, shape (n), N/m; of size 0 where there are none
   subroutine make_manifold_plan(reciprocal, n, by_r, n_target, correlated, plan, stat, spring)
-    logical, intent(in) :: reciprocal, by_r, correlated
-    integer, intent(in) :: n, n_target
+    logical, intent(in) :: reciprocal, correlated
+    integer, intent(in) :: n, by_r, n_target
     type(manifold_plan), intent(out) :: plan
     integer, intent(out) :: stat
     real(dp), intent(in) :: spring(:)
+    integer :: k, d
 
     plan%reciprocal = reciprocal
     plan%n = n
@@ -79,16 +85,24 @@ contains
     plan%correlated = correlated
     plan%n_free = merge((n*(n + 1))/2, n*n, reciprocal)
     plan%n_entry = merge(n*(2*n + 1), 4*n*n, reciprocal)
-    plan%n_column = 2*plan%n_free + merge(plan%n_free, 0, by_r) + n_target
+    if (by_r == by_diagonal) plan%n_joint = n
+    if (by_r == by_all) plan%n_joint = plan%n_free
+    plan%n_column = 2*plan%n_free + plan%n_joint + n_target
     plan%has_springs = any(spring > 0.0_dp)
     allocate (plan%spring(n), plan%row(plan%n_free), plan%column(plan%n_free), plan%gamma_row(plan%n_entry), &
               plan%gamma_column(plan%n_entry), plan%gamma(plan%n_entry), plan%in_rows(plan%n_entry), plan%kk_first(n), &
-              plan%groups(number_of_groups(plan)), stat=stat)
+              plan%groups(number_of_groups(plan)), plan%joint(plan%n_joint), stat=stat)
     if (stat /= 0) return
     plan%spring(:) = 0.0_dp
     if (plan%has_springs) plan%spring(:) = spring
     call list_triangle(reciprocal, n, plan%row, plan%column)
-    call place_elements(plan, by_r)
+    d = 0
+    do k = 1, plan%n_free
+      if (by_r == by_none .or. (by_r == by_diagonal .and. plan%row(k) /= plan%column(k))) cycle
+      d = d + 1
+      plan%joint(d) = k
+    end do
+    call place_elements(plan)
     call list_entries(plan, stat)
     if (stat == 0) call list_groups(plan, stat)
     if (stat == 0) call set_group(0, plan%n_entry, plan%n_column - 2*plan%n_free, plan%joint_groups(1), stat)
@@ -112,9 +126,8 @@ contains
     end do
   end subroutine list_triangle
 
-  subroutine place_elements(plan, by_r)
+  subroutine place_elements(plan)
     type(manifold_plan), intent(inout) :: plan
-    logical, intent(in) :: by_r
     integer :: n2, i
 
     n2 = plan%n*plan%n
@@ -151,8 +164,8 @@ contains
     plan%whitened = plan%columns
     if (plan%correlated) plan%whitened = run(plan%n_entry*plan%n_column)
     plan%normal = run(plan%n_column**2)
-    if (by_r) then
-      plan%result = run(plan%n_free**2)
+    if (plan%n_joint > 0) then
+      plan%result = run(plan%n_joint**2)
       do i = 1, size(plan%of_r)
         plan%of_r(i) = run(n2)
       end do

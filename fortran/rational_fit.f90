@@ -17,6 +17,7 @@ module jointfrf_rational_fit
   implicit none
   private
   public :: rational_fit, relocate_poles
+  public :: fit_entries, least_damping, leave_lines_out, load_entries, prepare_space, relocate
 
   !> Their pairs are counted by default integers, with room to spare.
   integer, parameter, public :: most_poles = 10000
@@ -31,12 +32,12 @@ module jointfrf_rational_fit
 
   !> Sums over the lines of weights times products of functions; an item is a piece of the pairs of functions.
   type, extends(shared_work) :: pair_sums
-    integer :: n, n_pairs
+    integer :: n, n_pairs, n_sums
     integer, allocatable :: first(:), second(:)                !< functions of a pair, first <= second
-    real(dp), allocatable :: weights(:, :)                     !< (n_freq, number of sums)
+    real(dp), allocatable :: weights(:, :)                     !< (n_freq, most sums)
     real(dp), allocatable :: re(:, :), im(:, :)                !< psi, (n_freq, n)
     real(dp), pointer, contiguous :: products(:, :, :) => null()   !< (piece_lines, 2 piece_pairs, threads)
-    real(dp), pointer, contiguous :: sums(:, :, :) => null()   !< (number of sums, 2, n_pairs): of Re, of Im
+    real(dp), pointer, contiguous :: sums(:, :, :) => null()   !< (most sums, 2, n_pairs): of Re, of Im
     real(dp), allocatable :: own_products(:, :, :), own_sums(:, :, :)   !< where they lie
   contains
     procedure :: do_items => sum_pairs
@@ -50,25 +51,36 @@ module jointfrf_rational_fit
     complex(dp), pointer, contiguous :: work(:, :, :, :) => null() !< (n, n, 3, threads)
     integer(blas_ip), pointer, contiguous :: pivot(:, :) => null() !< (n, threads)
     integer, pointer, contiguous :: failed(:) => null()        !< (n_entries), 0 good
-    complex(dp), allocatable :: own_forms(:, :, :), own_work(:, :, :, :)   !< where they lie
-    integer(blas_ip), allocatable :: own_pivot(:, :)
-    integer, allocatable :: own_failed(:)
   contains
     procedure :: do_items => eliminate_numerators
   end type elimination
 
-  !> psi and R, and what finding them takes: projections, the root of the mean weight.
+  !> psi and R, what finding them takes, and the root of the mean weight.
   type :: orthonormal_basis
-    complex(dp), allocatable :: psi(:, :), triangle(:, :), numbers(:)
-    real(dp), allocatable :: mean_weight(:)
+    complex(dp), allocatable :: psi(:, :), numbers(:)
+    complex(dp), pointer, contiguous :: triangle(:, :) => null(), back(:, :) => null()     !< R and its inverse
+    real(dp), allocatable :: mean_weight(:), per_weight(:)                                 !< and its reciprocal
   end type orthonormal_basis
 
-  !> What finding the zeros of sigma takes.
-  type :: zero_space
-    complex(dp), allocatable :: sigma(:, :), found(:, :), back(:, :), matrix(:, :), moved(:), work(:)
+  !> Entries with their weights, and the memory in which they are fitted with any number of poles up to one that is
+  !> chosen when it is prepared. Whoever has one gives it TARGET.
+  type, public :: rational_space
+    private
+    type(pair_sums) :: gram
+    type(elimination) :: entries
+    type(orthonormal_basis) :: basis
+    !> Quadratic form of sigma, its coefficients, the matrix whose eigenvalues are its zeros.
+    complex(dp), pointer, contiguous :: form(:, :) => null(), sigma(:, :) => null(), found(:, :) => null()
+    complex(dp), pointer, contiguous :: matrix(:, :) => null()
+    complex(dp), pointer, contiguous :: coefficients(:, :) => null(), pull(:, :) => null()   !< of the entries, (n, m)
+    complex(dp), allocatable :: moved(:), pulled(:, :), work(:), memory(:)
     real(dp), allocatable :: real_work(:)
-    integer(blas_ip), allocatable :: pivot(:)
-  end type zero_space
+    integer(blas_ip), allocatable :: pivot(:, :)
+    integer, allocatable :: failed(:)
+    logical, allocatable :: good(:)
+    !> Whether basis and sums are those of the poles of the last relocation.
+    logical :: is_current = .false.
+  end type rational_space
 
 contains
 
@@ -93,50 +105,21 @@ contains
     complex(dp), contiguous, intent(inout) :: poles(:)
     real(dp), intent(out) :: squares
     integer(ip), intent(out) :: info
-    type(pair_sums), target :: gram
-    type(elimination), target :: entries
-    type(orthonormal_basis) :: basis
-    type(zero_space) :: space
-    complex(dp), allocatable :: moved(:), form(:, :), of_form(:, :)
-    real(dp) :: before, now
-    integer :: n, k, stat
+    type(rational_space), target :: space
+    integer :: stat
 
     info = info_good
     if (size(h) == 0) then
       squares = 0.0_dp
       return
     end if
-    n = size(poles) + 1
-    call prepare_sums(3*size(h, 2) + 1, n, size(s), gram, stat)
-    if (stat == 0) call prepare_basis(n, size(s), basis, stat)
-    if (stat == 0) call prepare_entries(n, size(h, 2), gram, entries, stat)
-    if (stat == 0) call prepare_zeros(n, space, stat)
-    if (stat == 0) allocate (moved(n - 1), form(n, n), of_form(n, 1), stat=stat)
+    call prepare_space(size(poles), size(h, 2), size(s), space, stat)
     if (stat /= 0) then
       info = info_no_memory
       return
     end if
-    call set_weights(h, weight, gram%weights)
-    squares = huge(squares)
-    before = huge(before)
-    moved(:) = poles
-    call hold_blas_threads()
-    do k = 0, iterations
-      call make_basis(s, weight, moved, basis)
-      call form_of_sigma(basis, gram, entries, form, info)
-      if (info /= info_good) exit
-      call multiply('N', form, basis%triangle(:, 1:1), of_form)
-      now = max(real(dot_product(basis%triangle(:, 1), of_form(:, 1)), dp), 0.0_dp)
-      if (now < squares) then
-        squares = now
-        poles = moved
-      end if
-      if (abs(before - now) <= still*now .or. k == iterations) exit
-      before = now
-      call zeros_of_sigma(basis, form, s, space, moved, info)
-      if (info /= info_good) exit
-    end do
-    call release_blas_threads()
+    call load_entries(h, weight, space)
+    call relocate(iterations, still, s, space, poles, squares, info)
   end subroutine relocate_poles
 
   !> Least-squares fit with given poles: normal equations in psi, corrected once by their residual.
@@ -151,24 +134,12 @@ contains
     complex(dp), contiguous, intent(out) :: smooth(:, :)
     real(dp), intent(out) :: squares, loss(:)
     integer(ip), intent(out) :: info
-    type(pair_sums), target :: gram
-    type(orthonormal_basis) :: basis
-    complex(dp), allocatable :: back(:, :), pulled(:, :), inverse(:, :, :), coefficients(:, :), pull(:, :), work(:, :)
-    complex(dp), allocatable :: change(:, :)
-    integer(blas_ip), allocatable :: pivot(:)
-    logical, allocatable :: good(:)
-    integer :: n, m, e, turn, stat
+    type(rational_space), target :: space
+    integer :: stat
 
     info = info_good
-    n = size(poles) + 1
-    m = size(h, 2)
     stat = 0
-    if (size(h) > 0) then
-      call prepare_sums(m, n, size(s), gram, stat)
-      if (stat == 0) call prepare_basis(n, size(s), basis, stat)
-      if (stat == 0) allocate (back(n, n), pulled(size(s), m), inverse(n, n, m), coefficients(n, m), pull(n, m), &
-                               work(n, n), change(n, 1), pivot(n), good(m), stat=stat)
-    end if
+    if (size(h) > 0) call prepare_space(size(poles), size(h, 2), size(s), space, stat)
     if (stat /= 0) then
       info = info_no_memory
       return
@@ -177,32 +148,93 @@ contains
     squares = 0.0_dp
     loss = 0.0_dp
     if (size(h) == 0) return
-    gram%weights(:, :) = weight**2
-    call hold_blas_threads()
-    call make_basis(s, weight, poles, basis)
-    call invert_triangle(basis%triangle, back)
-    call sum_all(basis, gram)
-    do e = 1, m
-      call invert_gram(gram, e, work, pivot, inverse(:, :, e), good(e))
-    end do
-    coefficients = 0.0_dp
-    do turn = 1, 2
-      pulled(:, :) = gram%weights*(h - smooth)
-      call multiply('C', basis%psi, pulled, pull)
-      do e = 1, m
-        if (.not. good(e)) cycle
-        call multiply('N', inverse(:, :, e), pull(:, e:e), change)
-        coefficients(:, e) = coefficients(:, e) + change(:, 1)
-      end do
-      call multiply('N', basis%psi, coefficients, smooth)
-    end do
-    do e = 1, m
-      if (good(e)) call add_loss(back, inverse(:, :, e), coefficients(:, e), work, loss)
-      squares = squares + sum(gram%weights(:, e)*(real(h(:, e) - smooth(:, e))**2 + aimag(h(:, e) - smooth(:, e))**2))
-    end do
-    info = count(.not. good, kind=ip)
-    call release_blas_threads()
+    call load_entries(h, weight, space)
+    call fit_entries(s, h, poles, space, smooth, squares, loss, info)
   end subroutine rational_fit
+
+  !> `relocate_poles` of the entries in a space; a fit with the poles found may follow at half the work.
+  subroutine relocate(iterations, still, s, space, poles, squares, info)
+    integer, intent(in) :: iterations
+    real(dp), intent(in) :: still
+    complex(dp), contiguous, intent(in) :: s(:)
+    type(rational_space), target, intent(inout) :: space
+    complex(dp), contiguous, intent(inout) :: poles(:)
+    real(dp), intent(out) :: squares
+    integer(ip), intent(out) :: info
+    real(dp) :: before, now
+    integer :: n, k
+
+    n = size(poles)
+    call set_order(n + 1, space)
+    squares = huge(squares)
+    before = huge(before)
+    space%moved(:n) = poles
+    call hold_blas_threads()
+    do k = 0, iterations
+      space%is_current = .false.
+      call make_basis(s, space%moved(:n), space%basis)
+      call form_of_sigma(space%basis, space%gram, space%entries, space%form, info)
+      if (info /= info_good) exit
+      call multiply('N', space%form, space%basis%triangle(:, 1:1), space%found)
+      now = max(real(dot_product(space%basis%triangle(:, 1), space%found(:, 1)), dp), 0.0_dp)
+      if (now < squares) then
+        squares = now
+        poles = space%moved(:n)
+        space%is_current = .true.
+      end if
+      if (abs(before - now) <= still*now .or. k == iterations) exit
+      before = now
+      call zeros_of_sigma(s, space, space%moved(:n), info)
+      if (info /= info_good) exit
+    end do
+    call release_blas_threads()
+  end subroutine relocate
+
+  !> `rational_fit` of the entries in a space.
+  subroutine fit_entries(s, h, poles, space, smooth, squares, loss, info)
+    complex(dp), contiguous, intent(in) :: s(:), h(:, :), poles(:)
+    type(rational_space), target, intent(inout) :: space
+    complex(dp), contiguous, intent(out) :: smooth(:, :)
+    real(dp), intent(out) :: squares, loss(:)
+    integer(ip), intent(out) :: info
+    integer :: e, turn, m
+
+    m = size(h, 2)
+    smooth = 0.0_dp
+    squares = 0.0_dp
+    loss = 0.0_dp
+    call hold_blas_threads()
+    if (.not. space%is_current) then
+      call set_order(size(poles) + 1, space)
+      call make_basis(s, poles, space%basis)
+      call sum_all(space%basis, m, space%gram)
+    end if
+    space%is_current = .false.
+    call invert_triangle(space%basis%triangle, space%basis%back)
+    associate (inverse => space%entries%forms, work => space%entries%work(:, :, 1, 1), good => space%good, &
+               coefficients => space%coefficients, weights => space%gram%weights)
+      do e = 1, m
+        call invert_gram(space%gram, e, work, space%pivot(:, 1), inverse(:, :, e), good(e))
+      end do
+      coefficients = 0.0_dp
+      do turn = 1, 2
+        space%pulled(:, :) = weights(:, :m)*(h - smooth)
+        call multiply('C', space%basis%psi(:, :space%gram%n), space%pulled, space%pull)
+        do e = 1, m
+          if (.not. good(e)) cycle
+          call multiply('N', inverse(:, :, e), space%pull(:, e:e), space%found)
+          coefficients(:, e) = coefficients(:, e) + space%found(:, 1)
+        end do
+        call multiply('N', space%basis%psi(:, :space%gram%n), coefficients, smooth)
+      end do
+      do e = 1, m
+        if (good(e)) call add_loss(space%basis%back, inverse(:, :, e), coefficients(:, e), work, loss)
+        squares = squares + sum(weights(:, e)*(real(h(:, e) - smooth(:, e))**2 + aimag(h(:, e) - smooth(:, e))**2))
+      end do
+      info = count(.not. good, kind=ip)
+    end associate
+    call release_blas_threads()
+  end subroutine fit_entries
 
   !> Inverse of the Gram matrix of an entry.
   !> normal, pivot   workspace
@@ -257,74 +289,134 @@ contains
                size(y, 1, kind=blas_ip), 1_c_size_t, 1_c_size_t)
   end subroutine multiply
 
-  subroutine prepare_basis(n, n_freq, basis, stat)
-    integer, intent(in) :: n, n_freq
-    type(orthonormal_basis), intent(inout) :: basis
+  !> Take memory for fits of so many entries on so many lines with `most` poles or fewer.
+  subroutine prepare_space(most, n_entries, n_freq, space, stat)
+    integer, intent(in) :: most, n_entries, n_freq
+    type(rational_space), target, intent(inout) :: space
     integer, intent(out) :: stat
+    integer :: n, n_sums, n_pairs, i, j, pair
+    integer(long) :: length
 
-    ! allow(C181): the caller looks at it
-    allocate (basis%psi(n_freq, n), basis%triangle(n, n), basis%numbers(n), basis%mean_weight(n_freq), stat=stat)
-  end subroutine prepare_basis
-
-  subroutine prepare_zeros(n, space, stat)
-    integer, intent(in) :: n
-    type(zero_space), intent(inout) :: space
-    integer, intent(out) :: stat
-
-    ! allow(C181): the caller looks at it
-    allocate (space%sigma(n, 1), space%found(n, 1), space%back(n, n), space%matrix(n - 1, n - 1), space%moved(n - 1), &
-              space%work(4*n), space%real_work(2*n), space%pivot(n), stat=stat)
-  end subroutine prepare_zeros
-
-  subroutine prepare_entries(n, n_entries, gram, entries, stat)
-    integer, intent(in) :: n, n_entries
-    type(pair_sums), target, intent(in) :: gram
-    type(elimination), target, intent(inout) :: entries
-    integer, intent(out) :: stat
-
-    entries%n = n
-    entries%n_entries = n_entries
-    entries%gram => gram
-    entries%threads = threads_for(24.0_dp*n_entries*real(n, dp)**3, int(n_entries, long), serial_flops_products)
-    allocate (entries%own_forms(n, n, n_entries), entries%own_failed(n_entries), &
-              entries%own_work(n, n, 3, entries%threads), entries%own_pivot(n, entries%threads), stat=stat)
-    if (stat /= 0) return
-    entries%forms => entries%own_forms
-    entries%failed => entries%own_failed
-    entries%work => entries%own_work
-    entries%pivot => entries%own_pivot
-  end subroutine prepare_entries
-
-  subroutine prepare_sums(n_sums, n, n_freq, gram, stat)
-    integer, intent(in) :: n_sums, n, n_freq
-    type(pair_sums), target, intent(inout) :: gram
-    integer, intent(out) :: stat
-    integer :: i, j, pair
-
-    gram%n = n
-    gram%n_pairs = n*(n + 1)/2
-    allocate (gram%first(gram%n_pairs), gram%second(gram%n_pairs), gram%weights(n_freq, n_sums), gram%re(n_freq, n), &
-              gram%im(n_freq, n), gram%own_sums(n_sums, 2, gram%n_pairs), &
-              gram%own_products(piece_lines, 2*piece_pairs, threads_of(n_sums, gram%n_pairs, n_freq)), stat=stat)
-    if (stat /= 0) return
-    gram%sums => gram%own_sums
-    gram%products => gram%own_products
-    pair = 0
-    do j = 1, n
-      do i = 1, j
-        pair = pair + 1
-        gram%first(pair) = i
-        gram%second(pair) = j
+    n = most + 1
+    n_sums = 3*n_entries + 1
+    n_pairs = n*(n + 1)/2
+    length = int(n, long)*n*(n_entries + 5_long + 3*elimination_threads(n, n_entries)) + 2_long*n*(n_entries + 1)
+    associate (gram => space%gram)
+      allocate (gram%first(n_pairs), gram%second(n_pairs), gram%weights(n_freq, n_sums), gram%re(n_freq, n), &
+                gram%im(n_freq, n), gram%own_sums(n_sums, 2, n_pairs), &
+                gram%own_products(piece_lines, 2*piece_pairs, sum_threads(n_sums, n_pairs, n_freq)), &
+                space%basis%psi(n_freq, n), space%basis%numbers(n), space%basis%mean_weight(n_freq), &
+                space%basis%per_weight(n_freq), space%memory(length), space%moved(most), &
+                space%pulled(n_freq, n_entries), space%work(4*n), space%real_work(2*n), &
+                space%pivot(n, elimination_threads(n, n_entries)), space%failed(n_entries), space%good(n_entries), &
+                stat=stat)
+      if (stat /= 0) return
+      gram%sums => gram%own_sums
+      gram%products => gram%own_products
+      pair = 0
+      do j = 1, n
+        do i = 1, j
+          pair = pair + 1
+          gram%first(pair) = i
+          gram%second(pair) = j
+        end do
       end do
-    end do
-  end subroutine prepare_sums
+    end associate
+    space%entries%gram => space%gram
+    space%entries%n_entries = n_entries
+    space%entries%failed => space%failed
+  end subroutine prepare_space
 
-  function threads_of(n_sums, n_pairs, n_freq) result(threads)
+  !> Weights of entries for the fits that follow.
+  !> h, weight   as in relocate_poles
+  subroutine load_entries(h, weight, space)
+    complex(dp), contiguous, intent(in) :: h(:, :)
+    real(dp), contiguous, intent(in) :: weight(:, :)
+    type(rational_space), intent(inout) :: space
+    integer :: e
+
+    call set_weights(h, weight, space%gram%weights)
+    space%basis%mean_weight(:) = 0.0_dp
+    do e = 1, size(h, 2)
+      space%basis%mean_weight(:) = space%basis%mean_weight + space%gram%weights(:, e)
+    end do
+    space%basis%mean_weight(:) = sqrt(space%basis%mean_weight/size(h, 2))
+    space%basis%per_weight(:) = 1/space%basis%mean_weight
+    space%is_current = .false.
+  end subroutine load_entries
+
+  !> Multiply the weight of chosen lines, of entries that were loaded, by a factor.
+  subroutine leave_lines_out(chosen, factor, space)
+    logical, intent(in) :: chosen(:)
+    real(dp), intent(in) :: factor
+    type(rational_space), intent(inout) :: space
+    integer :: line
+
+    do line = 1, size(chosen)
+      if (.not. chosen(line)) cycle
+      space%gram%weights(line, :) = space%gram%weights(line, :)*factor**2
+      space%basis%mean_weight(line) = space%basis%mean_weight(line)*factor
+      space%basis%per_weight(line) = 1/space%basis%mean_weight(line)
+    end do
+    space%is_current = .false.
+  end subroutine leave_lines_out
+
+  !> Place the matrices of a fit with n functions in the memory.
+  subroutine set_order(n, space)
+    integer, intent(in) :: n
+    type(rational_space), target, intent(inout) :: space
+    integer(long) :: used, square
+    integer :: m, threads
+
+    m = space%entries%n_entries
+    threads = elimination_threads(n, m)
+    square = int(n, long)*n
+    space%gram%n = n
+    space%gram%n_pairs = n*(n + 1)/2
+    space%entries%n = n
+    space%entries%threads = threads
+    used = 0
+    space%entries%forms(1:n, 1:n, 1:m) => space%memory(used + 1:used + square*m)
+    used = used + square*m
+    space%entries%work(1:n, 1:n, 1:3, 1:threads) => space%memory(used + 1:used + 3*square*threads)
+    used = used + 3*square*threads
+    space%entries%pivot => space%pivot
+    call view(space%memory, n, n, used, space%basis%triangle)
+    call view(space%memory, n, n, used, space%basis%back)
+    call view(space%memory, n, n, used, space%form)
+    call view(space%memory, n - 1, n - 1, used, space%matrix)
+    call view(space%memory, n, m, used, space%coefficients)
+    call view(space%memory, n, m, used, space%pull)
+    call view(space%memory, n, 1, used, space%sigma)
+    call view(space%memory, n, 1, used, space%found)
+  end subroutine set_order
+
+  !> The next matrix in a memory.
+  subroutine view(memory, rows, columns, used, matrix)
+    complex(dp), contiguous, target, intent(in) :: memory(:)
+    integer, intent(in) :: rows, columns
+    integer(long), intent(inout) :: used
+    complex(dp), pointer, contiguous, intent(out) :: matrix(:, :)
+    integer(long) :: length
+
+    length = int(rows, long)*columns
+    matrix(1:rows, 1:columns) => memory(used + 1:used + length)
+    used = used + length
+  end subroutine view
+
+  function elimination_threads(n, n_entries) result(threads)
+    integer, intent(in) :: n, n_entries
+    integer :: threads
+
+    threads = threads_for(24.0_dp*n_entries*real(n, dp)**3, int(n_entries, long), serial_flops_products)
+  end function elimination_threads
+
+  function sum_threads(n_sums, n_pairs, n_freq) result(threads)
     integer, intent(in) :: n_sums, n_pairs, n_freq
     integer :: threads
 
     threads = threads_for(4.0_dp*n_sums*n_pairs*n_freq, int((n_pairs - 1)/piece_pairs + 1, long), serial_flops_products)
-  end function threads_of
+  end function sum_threads
 
   !> w^2 of each entry, the sum of w^2 |h|^2 of all, w^2 Re h and w^2 Im h of each.
   pure subroutine set_weights(h, weight, weights)
@@ -344,20 +436,15 @@ contains
   end subroutine set_weights
 
   !> [1, 1/(s - p)] made orthonormal under the mean weight, by Gram and Schmidt, twice.
-  subroutine make_basis(s, weight, poles, basis)
+  subroutine make_basis(s, poles, basis)
     complex(dp), contiguous, intent(in) :: s(:), poles(:)
-    real(dp), contiguous, intent(in) :: weight(:, :)
     type(orthonormal_basis), intent(inout) :: basis
     complex(dp) :: distance
     real(dp) :: length
-    integer :: j, line, turn
+    integer :: j, line, n, turn
 
+    n = size(poles) + 1
     associate (psi => basis%psi, triangle => basis%triangle, numbers => basis%numbers, mean_weight => basis%mean_weight)
-      mean_weight = 0.0_dp
-      do j = 1, size(weight, 2)
-        mean_weight = mean_weight + weight(:, j)**2
-      end do
-      mean_weight = sqrt(mean_weight/size(weight, 2))
       triangle = 0.0_dp
       psi(:, 1) = mean_weight
       do j = 1, size(poles)
@@ -366,7 +453,7 @@ contains
           psi(line, j + 1) = conjg(distance)*(mean_weight(line)/(real(distance)**2 + aimag(distance)**2))
         end do
       end do
-      do j = 1, size(psi, 2)
+      do j = 1, n
         do turn = 1, merge(0, 2, j == 1)
           call project(psi(:, :j - 1), psi(:, j), numbers(:j - 1))
           call take_off(psi(:, :j - 1), numbers(:j - 1), psi(:, j))
@@ -376,9 +463,8 @@ contains
         triangle(j, j) = length
         if (length > 0.0_dp) psi(:, j) = psi(:, j)/length
       end do
-      mean_weight = 1/mean_weight
-      do j = 1, size(psi, 2)
-        psi(:, j) = psi(:, j)*mean_weight
+      do j = 1, n
+        psi(:, j) = psi(:, j)*basis%per_weight
       end do
     end associate
   end subroutine make_basis
@@ -421,13 +507,18 @@ contains
     end do
   end subroutine invert_triangle
 
-  subroutine sum_all(basis, gram)
+  !> Sums with the first n_sums weights.
+  subroutine sum_all(basis, n_sums, gram)
     type(orthonormal_basis), intent(in) :: basis
+    integer, intent(in) :: n_sums
     type(pair_sums), intent(inout) :: gram
+    integer :: threads
 
-    gram%re(:, :) = real(basis%psi)
-    gram%im(:, :) = aimag(basis%psi)
-    call share(gram, int((gram%n_pairs - 1)/piece_pairs + 1, long), size(gram%products, 3), even=.true.)
+    gram%n_sums = n_sums
+    gram%re(:, :gram%n) = real(basis%psi(:, :gram%n))
+    gram%im(:, :gram%n) = aimag(basis%psi(:, :gram%n))
+    threads = min(sum_threads(n_sums, gram%n_pairs, size(gram%re, 1)), size(gram%products, 3))
+    call share(gram, int((gram%n_pairs - 1)/piece_pairs + 1, long), threads, even=.true.)
   end subroutine sum_all
 
   subroutine sum_pairs(self, first, last, thread)
@@ -453,7 +544,7 @@ contains
           end associate
         end do
         beta = merge(0.0_dp, 1.0_dp, line == 1)
-        call dgemm('T', 'N', size(self%weights, 2, kind=blas_ip), int(2*pairs, blas_ip), int(lines, blas_ip), 1.0_dp, &
+        call dgemm('T', 'N', int(self%n_sums, blas_ip), int(2*pairs, blas_ip), int(lines, blas_ip), 1.0_dp, &
                    self%weights(line, 1), size(self%weights, 1, kind=blas_ip), self%products(:, :, thread), &
                    int(piece_lines, blas_ip), beta, self%sums(:, :, pair + 1:), size(self%sums, 1, kind=blas_ip), &
                    1_c_size_t, 1_c_size_t)
@@ -486,7 +577,7 @@ contains
     integer(ip), intent(out) :: info
     integer :: e, i, j, k
 
-    call sum_all(basis, gram)
+    call sum_all(basis, size(gram%weights, 2), gram)
     call share(entries, int(entries%n_entries, long), entries%threads, even=.true.)
     info = count(entries%failed /= 0, kind=ip)
     form = 0.0_dp
@@ -544,34 +635,32 @@ contains
   end subroutine eliminate_numerators
 
   !> Zeros of the sigma that minimises its form, its mean held.
-  subroutine zeros_of_sigma(basis, form, s, space, poles, info)
-    type(orthonormal_basis), intent(in) :: basis
-    complex(dp), contiguous, intent(inout) :: form(:, :)
+  subroutine zeros_of_sigma(s, space, poles, info)
     complex(dp), contiguous, intent(in) :: s(:)
-    type(zero_space), intent(inout) :: space
+    type(rational_space), intent(inout) :: space
     complex(dp), contiguous, intent(inout) :: poles(:)
     integer(ip), intent(out) :: info
     type(host_state) :: host
     complex(dp) :: no_left(1), no_right(1)
-    real(dp) :: trace, least
+    real(dp) :: trace
     integer(blas_ip) :: n, m, stat
     integer :: k
 
     info = info_good
-    n = size(form, 1, kind=blas_ip)
+    n = size(space%form, 1, kind=blas_ip)
     m = n - 1_blas_ip
     trace = 0.0_dp
-    do k = 1, size(form, 1)
-      trace = trace + real(form(k, k), dp)
+    do k = 1, size(space%form, 1)
+      trace = trace + real(space%form(k, k), dp)
     end do
-    associate (sigma => space%found, matrix => space%matrix, moved => space%moved)
+    associate (form => space%form, sigma => space%found, matrix => space%matrix)
       do k = 1, size(form, 1)
         form(k, k) = form(k, k) + rounding*trace/size(form, 1)
-        space%sigma(k, 1) = sum(conjg(basis%psi(:, k)))
+        space%sigma(k, 1) = sum(conjg(space%basis%psi(:, k)))
       end do
-      call zgesv(n, 1_blas_ip, form, n, space%pivot, space%sigma, n, stat)
-      call invert_triangle(basis%triangle, space%back)
-      call multiply('N', space%back, space%sigma, sigma)
+      call zgesv(n, 1_blas_ip, form, n, space%pivot(:, 1), space%sigma, n, stat)
+      call invert_triangle(space%basis%triangle, space%basis%back)
+      call multiply('N', space%basis%back, space%sigma, sigma)
       if (stat /= 0 .or. .not. abs(sigma(1, 1)) > 0.0_dp) info = 1
       if (info /= info_good .or. m == 0) return
       do k = 1, size(poles)
@@ -583,15 +672,22 @@ contains
         return
       end if
       call hold_all_traps(host)
-      call zgeev('N', 'N', m, matrix, m, moved, no_left, 1_blas_ip, no_right, 1_blas_ip, space%work, &
+      call zgeev('N', 'N', m, matrix, m, poles, no_left, 1_blas_ip, no_right, 1_blas_ip, space%work, &
                  size(space%work, kind=blas_ip), space%real_work, stat, 1_c_size_t, 1_c_size_t)
       call release_all_traps(host)
       if (stat /= 0) then
         info = 1
         return
       end if
-      least = nearest*(maxval(aimag(s)) - minval(aimag(s)))/size(s)
-      poles = cmplx(-max(abs(real(moved)), least), aimag(moved), dp)
+      poles = cmplx(-max(abs(real(poles)), least_damping(s)), aimag(poles), dp)
     end associate
   end subroutine zeros_of_sigma
+
+  !> Least distance of poles from the frequency axis.
+  pure function least_damping(s) result(least)
+    complex(dp), intent(in) :: s(:)
+    real(dp) :: least
+
+    least = nearest*(maxval(aimag(s)) - minval(aimag(s)))/size(s)
+  end function least_damping
 end module jointfrf_rational_fit

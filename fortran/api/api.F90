@@ -51,29 +51,38 @@ module jointfrf
   use jointfrf_brick, only: brick_matrices, brick_quality
   use jointfrf_checks, only: check_brick_matrices, check_brick_quality, check_central_difference, &
     check_compliance_covariance, check_compliance_factors, check_couple, check_couple_bodies, check_decouple, &
-    check_difference_weights, check_expect_on_joint, check_fit_diagonal_joint, check_invert, check_joint_forms, &
-    check_joint_normal_equations, check_matrices, check_modify, check_monte_carlo, check_pollute, &
+    check_difference_weights, check_expect_on_joint, check_fit_diagonal_joint, check_fit_joint, check_invert, &
+    check_joint_forms, check_joint_normal_equations, check_matrices, check_modify, check_monte_carlo, check_pollute, &
     check_project_on_joint, check_rational_fit, check_receptance, check_receptance_banded, &
-    check_receptance_modal, check_relocate_poles, check_solve, check_springs, check_transform
+    check_receptance_modal, check_relocate_poles, check_smooth_frfs, check_solve, check_springs, check_start_joint, &
+    check_terms, check_transform, check_estimate_noise, check_line_noise, check_noise_parts
   use jointfrf_compliance, only: joint_compliance
   use jointfrf_compliance_noise, only: compliance_covariance, compliance_factors
   use jointfrf_coupling, only: couple
   use jointfrf_decoupling, only: decouple
-  use jointfrf_diagonal_joint, only: diagonal_joint, fit_diagonal_joint, line_forms, search_limits
+  use jointfrf_diagonal_joint, only: diagonal_joint, fit_diagonal_joint, line_forms, lowest_diagonal_joint, &
+    search_limits
   use jointfrf_dynamic_stiffness, only: receptance_banded, receptance_dense
   use jointfrf_engine, only: engine_automatic, engine_lapack, engine_plain, engine_v2, engine_v3, engine_v4, &
     get_engine, set_engine
+  use jointfrf_estimate_noise, only: estimate_noise
   use jointfrf_finite_difference, only: central_difference, difference_weights, transform_receptance
   use jointfrf_ismm, only: inverse_substructuring, ismm
   use jointfrf_joint_derivatives, only: joint_normal_equations
+  use jointfrf_joint_fit, only: fit_joint, fit_options, joint_fit, set_line_descent, set_values
+  use jointfrf_joint_frfs, only: joint_frfs
+  use jointfrf_joint_start, only: start_joint
   use jointfrf_kinds, only: ip, long
+  use jointfrf_line_noise, only: level_space, line_correlation, line_levels, prepare_levels
   use jointfrf_linear_algebra, only: invert, solve
   use jointfrf_manifold, only: expect_on_joint, joint_forms, project_on_joint
   use jointfrf_modal, only: receptance_modal
   use jointfrf_modification, only: find_modification, modify
   use jointfrf_monte_carlo, only: monte_carlo
   use jointfrf_noise, only: make_noise, pollute
+  use jointfrf_noise_parts, only: likely_parts, noise_parts
   use jointfrf_rational_fit, only: rational_fit, relocate_poles
+  use jointfrf_smooth_frfs, only: smooth_frfs
   use jointfrf_status, only: info_good, info_no_engine, info_no_memory, info_text, line_good, line_not_finite, &
     line_overflow, line_text
   use jointfrf_traps, only: hold_traps, host_state, release_traps
@@ -89,11 +98,13 @@ module jointfrf
   public :: jf_joint_compliance, jf_compliance_factors, jf_compliance_covariance
   public :: jf_project_with_springs, jf_expect_with_springs, jf_forms_with_springs
   public :: jf_project_on_joint, jf_expect_on_joint, jf_joint_forms, jf_fit_diagonal_joint, &
-    jf_joint_normal_equations
+    jf_lowest_diagonal_joint, jf_joint_normal_equations
+  public :: jf_start_joint, jf_fit_joint
   public :: jf_difference_weights, jf_central_difference, jf_transform
   public :: jf_pollute, jf_monte_carlo
   public :: jf_brick_matrices, jf_brick_quality
-  public :: jf_rational_fit, jf_relocate_poles
+  public :: jf_rational_fit, jf_relocate_poles, jf_smooth_frfs
+  public :: jf_estimate_noise, jf_line_correlation, jf_line_levels, jf_noise_parts
   public :: jf_invert_work, jf_solve_work, jf_receptance_work, jf_receptance_banded_work, jf_receptance_modal_work
   public :: jf_couple_work, jf_modify_work, jf_find_modification_work, jf_ismm_work, jf_inverse_substructuring_work
   public :: jf_decouple_work, jf_joint_compliance_work, jf_compliance_factors_work, jf_compliance_covariance_work
@@ -754,7 +765,7 @@ contains
     call hold_traps(host)
     info = check_joint_forms(trans, reciprocal, n, n_free, n_correlated, n_freq, n_target)
     if (info == info_good) then
-      call joint_forms(is_transposed(trans), reciprocal == 1, gamma, inverse_std, whitening, c_joint, free_h, &
+      call joint_forms(is_transposed(trans), reciprocal == 1, .false., gamma, inverse_std, whitening, c_joint, free_h, &
                        free_m, information, gradient, squares, line_info, info, no_springs)
     end if
     call release_traps(host)
@@ -866,7 +877,7 @@ contains
     info = check_joint_forms(trans, reciprocal, n, n_free, n_correlated, n_freq, n_target)
     if (info == info_good) info = check_springs(spring, -8_ip)
     if (info == info_good) then
-      call joint_forms(is_transposed(trans), reciprocal == 1, gamma, inverse_std, whitening, r_joint, free_h, &
+      call joint_forms(is_transposed(trans), reciprocal == 1, .false., gamma, inverse_std, whitening, r_joint, free_h, &
                        free_q, information, gradient, squares, line_info, info, spring)
     end if
     call release_traps(host)
@@ -912,30 +923,278 @@ contains
     type(line_forms) :: forms
     type(search_limits) :: limits
     type(host_state) :: host
-    integer :: stat
 
     call hold_traps(host)
     info = check_fit_diagonal_joint(trans, by_rate, n, n_par, n_freq, steps, held, least_gain, dofs, kinds, lower, &
                                     upper)
+    if (info == info_good) call set_search(by_rate, n, steps, held, least_gain, dofs, kinds, lower, upper, joint, &
+                                           limits, info)
     if (info == info_good) then
-      allocate (joint%dof(n_par), joint%kind(n_par), limits%lower(n_par), limits%upper(n_par), stat=stat)
-      if (stat /= 0) info = info_no_memory
-    end if
-    if (info == info_good) then
-      joint%n = int(n)
-      joint%by_rate = by_rate == 1
-      joint%dof(:) = int(dofs)
-      joint%kind(:) = int(kinds)
       forms = line_forms(is_transposed(trans), omega, c_joint, information, gradient, squares)
-      limits%steps = int(steps)
-      limits%held = int(held)
-      limits%least_gain = least_gain
-      limits%lower(:) = lower
-      limits%upper(:) = upper
       call fit_diagonal_joint(joint, forms, limits, x, normal, descent, cost, info)
     end if
     call release_traps(host)
   end subroutine jf_fit_diagonal_joint
+
+  !> The same, also from other starts: where a DOF ends rigid, or its damping near its limit, from no damping and from
+  !> some. At a = 0 nothing moves a rate any more, not even from the wrong sign of damping.
+  !> by_rate, n, n_par, steps, held, least_gain, lower, upper    as in jf_fit_diagonal_joint
+  !> omega, c_joint, information, gradient, squares    as in jf_fit_diagonal_joint
+  !> dofs          the DOF of each parameter, counted from 1, shape (n_par); those of the compliances come first, in
+  !>               their order
+  !> kinds         as in jf_fit_diagonal_joint
+  !> x, normal, descent, cost, info    as in jf_fit_diagonal_joint
+  subroutine jf_lowest_diagonal_joint(trans, by_rate, n, n_par, n_freq, steps, held, least_gain, dofs, kinds, lower, &
+                                      upper, omega, c_joint, information, gradient, squares, x, normal, descent, &
+                                      cost, info) bind(C, name='jf_lowest_diagonal_joint_')
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: by_rate, n, n_par, n_freq, steps, held, dofs(n_par), kinds(n_par)
+    real(c_double), intent(in) :: least_gain, lower(n_par), upper(n_par)
+    real(c_double), target, intent(in) :: omega(n_freq), squares(n_freq)
+    complex(c_double_complex), target, intent(in) :: c_joint(n, n_freq), information(n, n, n_freq), gradient(n, n_freq)
+    real(c_double), intent(inout) :: x(n_par)
+    real(c_double), intent(out) :: normal(n_par, n_par), descent(n_par), cost
+    integer(ip), intent(out) :: info
+    type(diagonal_joint) :: joint
+    type(line_forms) :: forms
+    type(search_limits) :: limits
+    type(host_state) :: host
+
+    call hold_traps(host)
+    info = check_fit_diagonal_joint(trans, by_rate, n, n_par, n_freq, steps, held, least_gain, dofs, kinds, lower, &
+                                    upper)
+    if (info == info_good) info = check_terms(n, dofs, kinds, -9_ip, -10_ip)
+    if (info == info_good) call set_search(by_rate, n, steps, held, least_gain, dofs, kinds, lower, upper, joint, &
+                                           limits, info)
+    if (info == info_good) then
+      forms = line_forms(is_transposed(trans), omega, c_joint, information, gradient, squares)
+      call lowest_diagonal_joint(joint, forms, limits, x, normal, descent, cost, info)
+    end if
+    call release_traps(host)
+  end subroutine jf_lowest_diagonal_joint
+
+  !> Coordinates from which the fit of a joint without cross terms may begin, from the compliance of smooth FRFs.
+  !> R = (C^-1 + Z)^-1 is the compliance of the joint in parallel with reference springs Z. On every line C and, to
+  !> first order, the variance of R follow from gamma; lines on which noise hides gamma_jk count little.
+  !> reciprocal     as in jf_project_on_joint
+  !> n              number of joint DOFs, 1 to 1000
+  !> n_par          number of parameters, n to 3 n
+  !> n_row          2 n; or n_entry of jf_project_on_joint for packed FRFs: the entries that are read, row by row
+  !> n_column       2 n; or 1 for packed FRFs
+  !> dofs           the DOF of each parameter, counted from 1, shape (n_par); those of the compliances come first, in
+  !>                their order
+  !> kinds          what it is, shape (n_par): 0 a = 1/(k + z), m/N, first for every DOF; 1 eta = h a; 2 tau = c a, s.
+  !>                None twice.
+  !> omega          angular frequencies, shape (n_freq), rad/s
+  !> spring         Z, shape (n), >= 0, N/m
+  !> smooth         smooth FRFs at DOFs j, then k, shape (n_row, n_column, n_freq), m/N
+  !> inverse_std    1/sqrt(E|e|^2) of the noise e of the measured FRFs, shape (n_row, n_column, n_freq), N/m; 0 where an
+  !>                entry is not used
+  !> fitted         least squares of the diagonal of R, shape (n_par); 0 where no line gives it
+  !> undamped       its mean, no damping, shape (n_par)
+  !> info           0, -i, -1000 as above
+  subroutine jf_start_joint(trans, reciprocal, n, n_par, n_row, n_column, n_freq, dofs, kinds, omega, spring, smooth, &
+                            inverse_std, fitted, undamped, info) bind(C, name='jf_start_joint_')
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: reciprocal, n, n_par, n_row, n_column, n_freq, dofs(n_par), kinds(n_par)
+    real(c_double), target, intent(in) :: omega(n_freq)
+    real(c_double), intent(in) :: spring(n)
+    complex(c_double_complex), target, intent(in) :: smooth(n_row, n_column, n_freq)
+    real(c_double), target, intent(in) :: inverse_std(n_row, n_column, n_freq)
+    real(c_double), intent(out) :: fitted(n_par), undamped(n_par)
+    integer(ip), intent(out) :: info
+    type(diagonal_joint) :: joint
+    type(joint_frfs) :: frfs
+    real(c_double), allocatable :: starts(:, :)
+    type(host_state) :: host
+    integer :: stat
+
+    call hold_traps(host)
+    info = check_start_joint(trans, reciprocal, n, n_par, n_row, n_column, n_freq, dofs, kinds, omega, spring)
+    if (info == info_good) call set_terms(n, dofs, kinds, joint, info)
+    if (info == info_good) then
+      allocate (starts(n_par, 2), stat=stat)
+      if (stat /= 0) info = info_no_memory
+    end if
+    if (info == info_good) call set_frfs(is_transposed(trans), reciprocal == 1, n, n_row, n_column, omega, smooth, &
+                                         inverse_std, frfs, info)
+    if (info == info_good) then
+      call start_joint(joint, frfs, spring, starts(:, 1), starts(:, 2), info)
+    end if
+    if (info == info_good) then
+      fitted = starts(:, 1)
+      undamped = starts(:, 2)
+    end if
+    call release_traps(host)
+  end subroutine jf_start_joint
+
+  !> The joint without cross terms that fits FRFs at the joint best: stiffnesses, damping, and their covariance.
+  !> Maximum likelihood for FRFs with independent noise of known size: smooth FRFs are projected on those that fit the
+  !> present joint, measured ones are linearised there, the sum over all lines is minimised, and so on until the joint
+  !> moves by less than a share of its standard error. Coordinates are a = 1/(k + z) with reference springs z, which are
+  !> regular for rigid and free DOFs, and the rates eta = h a and tau = c a. In lanes whatever engine is chosen; lines
+  !> are shared among threads, and results do not depend on their number.
+  !> reciprocal, n_correlated    as in jf_project_on_joint
+  !> n, n_par, n_row, n_column, dofs, kinds    as in jf_start_joint
+  !> start          0: springs, x, H and Q are found; 1: spring and x are given; 2: free_h and free_q as well
+  !> patience       linearisations after which a fit far from the data ends, for example 8
+  !> flexible       1: the sides may be flexible between channels and joint, and no joint need be near all lines; 0:
+  !>                they are rigid
+  !> farthest       a line whose distance exceeds this is not used; 0: 3 n^2
+  !> omega          angular frequencies, shape (n_freq), rad/s
+  !> smooth         smooth FRFs at DOFs j, then k, shape (n_row, n_column, n_freq), m/N; the measured ones where they
+  !>                were not smoothed
+  !> measured       measured FRFs, shape (n_row, n_column, n_freq), m/N
+  !> inverse_std    as in jf_start_joint
+  !> whitening      as in jf_project_on_joint
+  !> spring         z, shape (n), > 0, N/m: given, or with start 0 as stiff as the structure
+  !> x              coordinates, shape (n_par): where to begin, then what was found
+  !> free_h         H of the FRFs that fit the joint, nearest to the smooth ones, shape (n, n, n_freq), m/N; with
+  !>                start 2 where to begin
+  !> free_q         Q, shape (n, n, n_freq), N/m: likewise
+  !> values         stiffness k = 1/a - z, N/m, damping h = eta/a, N/m, and c = tau/a, N s/m, shape (n_par); infinite
+  !>                for a rigid DOF
+  !> covariance     of the values, for independent noise between lines, shape (n_par, n_par)
+  !> normal         Re(J^H W J) summed over the lines, shape (n_par, n_par): half the information on the coordinates
+  !> descent        Re(J^H (p - W d)), shape (n_par): 0 but for coordinates at their limits
+  !> cost           squares of the residual; their mean is 1 for each equation
+  !> equations      complex equations of the lines that are used
+  !> line_descent   descent of each line, shape (n_par, n_freq): for a covariance that is robust, N^-1 G N^-1 with the
+  !>                sum N of normal and the sum G of the products of descents
+  !> distance       squares between the smooth FRFs and those that fit the joint, shape (n_freq)
+  !> used           1 for a line that is used, 0 for another, shape (n_freq)
+  !> c_joint        entries of R about which was linearised last, shape (n, n_freq), m/N
+  !> information    W of the quadratic forms s - 2 Re(d^H p) + d^H W d of the diagonal of R = c_joint + d, shape
+  !>                (n, n, n_freq); forms are zero on lines that are not used
+  !> gradient       p, shape (n, n_freq)
+  !> squares        s, shape (n_freq)
+  !> iterations     linearisations
+  !> converged      1: the joint did not move any more; 0: it did
+  subroutine jf_fit_joint(trans, reciprocal, n, n_par, n_row, n_column, n_correlated, n_freq, start, patience, &
+                          flexible, farthest, dofs, kinds, omega, smooth, measured, inverse_std, whitening, spring, &
+                          x, free_h, free_q, values, covariance, normal, descent, cost, equations, line_descent, &
+                          distance, used, c_joint, information, gradient, squares, iterations, converged, line_info, &
+                          info) &
+    bind(C, name='jf_fit_joint_')
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: reciprocal, n, n_par, n_row, n_column, n_correlated, n_freq, start, patience, flexible
+    real(c_double), intent(in) :: farthest
+    integer(ip), intent(in) :: dofs(n_par), kinds(n_par)
+    real(c_double), target, intent(in) :: omega(n_freq)
+    complex(c_double_complex), target, intent(in) :: smooth(n_row, n_column, n_freq)
+    complex(c_double_complex), target, intent(in) :: measured(n_row, n_column, n_freq)
+    real(c_double), target, intent(in) :: inverse_std(n_row, n_column, n_freq)
+    real(c_double), target, intent(in) :: whitening(n_correlated, n_correlated, n_freq)
+    real(c_double), intent(inout) :: spring(n), x(n_par)
+    complex(c_double_complex), intent(inout) :: free_h(n, n, n_freq), free_q(n, n, n_freq)
+    real(c_double), intent(out) :: values(n_par), covariance(n_par, n_par), normal(n_par, n_par), descent(n_par)
+    real(c_double), intent(out) :: cost, equations, line_descent(n_par, n_freq), distance(n_freq)
+    integer(ip), intent(out) :: used(n_freq)
+    complex(c_double_complex), intent(out) :: c_joint(n, n_freq), information(n, n, n_freq), gradient(n, n_freq)
+    real(c_double), intent(out) :: squares(n_freq)
+    integer(ip), intent(out) :: iterations, converged, line_info(n_freq), info
+    type(diagonal_joint) :: joint
+    type(joint_frfs) :: frfs
+    type(fit_options) :: options
+    type(joint_fit) :: fit
+    type(host_state) :: host
+
+    call hold_traps(host)
+    info = check_fit_joint(trans, reciprocal, n, n_par, n_row, n_column, n_correlated, n_freq, start, patience, &
+                           flexible, farthest, dofs, kinds, omega, spring, x)
+    if (info == info_good) call set_terms(n, dofs, kinds, joint, info)
+    if (info == info_good) call set_frfs(is_transposed(trans), reciprocal == 1, n, n_row, n_column, omega, smooth, &
+                                         inverse_std, frfs, info)
+    if (info == info_good) then
+      frfs%measured(1:size(frfs%smooth, 1), 1:n_freq) => measured
+      frfs%whitening => whitening
+      options%patience = int(patience)
+      options%farthest = farthest
+      options%flexible = flexible == 1
+      options%start = int(start)
+      call fit_joint(joint, frfs, options, spring, x, free_h, free_q, fit, info)
+    end if
+    if (info >= info_good) then
+      spring = fit%spring
+      x = fit%found%x
+      free_h = fit%h
+      free_q = fit%q
+      call set_values(joint, spring, x, fit%found%covariance, values, covariance)
+      normal = fit%found%normal
+      descent = fit%found%descent
+      cost = fit%found%cost
+      equations = fit%equations
+      call set_line_descent(joint, frfs, fit, line_descent)
+      distance = fit%distance
+      used = merge(1_ip, 0_ip, fit%used)
+      c_joint = fit%c_joint
+      information = fit%information
+      gradient = fit%gradient
+      squares = fit%squares
+      iterations = int(fit%iterations, ip)
+      converged = merge(1_ip, 0_ip, fit%converged)
+      line_info = fit%line_info
+    end if
+    call release_traps(host)
+  end subroutine jf_fit_joint
+
+  !> FRFs at a joint in the caller's memory.
+  subroutine set_frfs(transposed, reciprocal, n, n_row, n_column, omega, smooth, inverse_std, frfs, info)
+    logical, intent(in) :: transposed, reciprocal
+    integer(ip), intent(in) :: n, n_row, n_column
+    real(c_double), contiguous, target, intent(in) :: omega(:), inverse_std(:, :, :)
+    complex(c_double_complex), contiguous, target, intent(in) :: smooth(:, :, :)
+    type(joint_frfs), intent(inout) :: frfs
+    integer(ip), intent(out) :: info
+    integer :: stat
+
+    frfs%transposed = transposed
+    frfs%reciprocal = reciprocal
+    frfs%n_row = int(n_row)
+    frfs%n_column = int(n_column)
+    frfs%omega => omega
+    frfs%smooth(1:n_row*n_column, 1:size(omega)) => smooth
+    frfs%inverse_std(1:n_row*n_column, 1:size(omega)) => inverse_std
+    call frfs%set_places(int(n), stat)
+    info = merge(info_good, info_no_memory, stat == 0)
+  end subroutine set_frfs
+
+  !> Terms of a joint without cross terms.
+  subroutine set_terms(n, dofs, kinds, joint, info)
+    integer(ip), intent(in) :: n, dofs(:), kinds(:)
+    type(diagonal_joint), intent(inout) :: joint
+    integer(ip), intent(out) :: info
+    integer :: stat
+
+    allocate (joint%dof(size(dofs)), joint%kind(size(dofs)), stat=stat)
+    info = merge(info_good, info_no_memory, stat == 0)
+    if (stat /= 0) return
+    joint%n = int(n)
+    joint%dof(:) = int(dofs)
+    joint%kind(:) = int(kinds)
+  end subroutine set_terms
+
+  !> Terms of a joint without cross terms, and where and how long is searched for it.
+  subroutine set_search(by_rate, n, steps, held, least_gain, dofs, kinds, lower, upper, joint, limits, info)
+    integer(ip), intent(in) :: by_rate, n, steps, held, dofs(:), kinds(:)
+    real(c_double), intent(in) :: least_gain, lower(:), upper(:)
+    type(diagonal_joint), intent(inout) :: joint
+    type(search_limits), intent(inout) :: limits
+    integer(ip), intent(out) :: info
+    integer :: stat
+
+    call set_terms(n, dofs, kinds, joint, info)
+    if (info /= info_good) return
+    joint%by_rate = by_rate == 1
+    allocate (limits%lower(size(dofs)), limits%upper(size(dofs)), stat=stat)
+    info = merge(info_good, info_no_memory, stat == 0)
+    if (stat /= 0) return
+    limits%steps = int(steps)
+    limits%held = int(held)
+    limits%least_gain = least_gain
+    limits%lower(:) = lower
+    limits%upper(:) = upper
+  end subroutine set_search
 
   !> Normal equations of the parameters of any joint for quadratic forms of its compliance, as in jf_fit_diagonal_joint.
   !> With C the compliance, J is its derivative by the parameters, -f C E C of its upper triangle: each parameter adds a
@@ -1250,4 +1509,192 @@ contains
     if (info == info_good) call relocate_poles(int(iterations), still, s, h, weight, poles, squares, info)
     call release_traps(host)
   end subroutine jf_relocate_poles
+
+  !> Smooth FRFs: rational functions c_0 + sum c_k/(i w - p_k) with common poles through several FRFs. Poles are added
+  !> until the residual vanishes in the mean over neighbouring lines, relocated, and removed if they are not worth their
+  !> parameters, by generalised cross-validation.
+  !> n_entries   number of FRFs
+  !> n_freq      as above
+  !> max_poles   most poles, from 1 to 10000; no more than a third of the lines are used
+  !> n_start     number of first poles, at most max_poles; 0 for poles at the peaks of the FRFs
+  !> patience    orders in a row that may gain nothing before the search ends, 2 for example; 0 for no poles beside the
+  !>             first ones, which are relocated
+  !> inflation   number of neighbouring lines that carry the noise of one independent line, >= 1; 0 to find it from the
+  !>             residual
+  !> freq        frequency of each line, rising, >= 0, Hz, shape (n_freq)
+  !> h           FRFs, shape (n_freq, n_entries), any unit
+  !> variance    E|e|^2 of their noise up to one factor, > 0, shape (n_freq, n_entries)
+  !> poles       in: first poles; out: the poles, rad/s, shape (max_poles)
+  !> n_poles     number of poles found
+  !> smooth      the smooth FRFs, shape (n_freq, n_entries)
+  !> squares     sum of |h - smooth|^2/variance, without lines that single poles followed
+  !> info        0, -i, -1000 as above; > 0 so many FRFs had singular equations, and smooth is 0 there
+  subroutine jf_smooth_frfs(n_entries, n_freq, max_poles, n_start, patience, inflation, freq, h, variance, poles, &
+                            n_poles, smooth, squares, info) bind(C, name='jf_smooth_frfs_')
+    integer(ip), intent(in) :: n_entries, n_freq, max_poles, n_start, patience
+    real(c_double), intent(in) :: inflation, freq(n_freq), variance(n_freq, n_entries)
+    complex(c_double_complex), target, intent(in) :: h(n_freq, n_entries)
+    complex(c_double_complex), intent(inout) :: poles(max_poles)
+    integer(ip), intent(out) :: n_poles
+    complex(c_double_complex), intent(out) :: smooth(n_freq, n_entries)
+    real(c_double), intent(out) :: squares
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
+
+    call hold_traps(host)
+    info = check_smooth_frfs(n_entries, n_freq, max_poles, n_start, patience, inflation, freq, h, variance)
+    if (info == info_good) then
+      call smooth_frfs(freq, h, variance, inflation, int(patience), int(n_start), poles, n_poles, smooth, squares, info)
+    end if
+    call release_traps(host)
+  end subroutine jf_smooth_frfs
+
+  !> Noise of FRFs by the residual of smooth ones:
+  !> E|e|^2 = line_level line_factor (parts(1)^2 |smooth|^2 + parts(2)^2 s + parts(3)^2 given), s = 1 for a floor that
+  !> is constant in the unit of h, or s = floor_shape, whichever is more likely.
+  !> n_entries        number of FRFs
+  !> n_freq           as above
+  !> n_pairs          number, or 0 for no pairs of FRFs that are the same but for noise, h_pq and h_qp for example
+  !> robust           1: for weights of a further smoothing, as errors of smooth FRFs at peaks and antiresonances do not
+  !>                  count; 0: the maximum of the likelihood
+  !> floor_shape      dependence of a floor on frequency that may be more likely, > 0, shape (n_freq): (f_m/f)^4 for
+  !>                  receptances whose accelerances have a constant floor, f_m the median line; 1 for no other floor
+  !> h                measured FRFs, shape (n_freq, n_entries)
+  !> smooth           smooth FRFs, from jf_smooth_frfs for example, shape (n_freq, n_entries)
+  !> share            part of the noise power that each smooth FRF has taken up, its parameters over its data, >= 0,
+  !>                  shape (n_entries)
+  !> given            variance that is known up to a factor, by coherence for example, >= 0, shape (n_freq, n_entries);
+  !>                  all 0 if none is
+  !> first            one FRF of each pair, counted from 1, shape (n_pairs)
+  !> second           the other, shape (n_pairs)
+  !> inflation        number of neighbouring lines that carry the noise of one independent line, >= 1, as far as it is
+  !>                  known; 1 if it is not
+  !> parts            relative part, floor, and factor of the variance that is given, shape (n_entries, 3)
+  !> variance         E|e|^2, shape (n_freq, n_entries)
+  !> line_level       slow variation of the noise power over frequency, shape (n_freq); 1 if none is significant
+  !> line_factor      by how much an outlying line exceeds the lines around, shape (n_freq); 1 for other lines
+  !> is_shaped        1 if the floor follows floor_shape, 0 if it is constant
+  !> found            inflation of this noise, by the differences of the pairs, without pairs by h - smooth
+  !> info             0, -i, -1000 as above
+  subroutine jf_estimate_noise(n_entries, n_freq, n_pairs, robust, floor_shape, h, smooth, share, given, first, &
+                               second, inflation, parts, variance, line_level, line_factor, is_shaped, found, &
+                               info) bind(C, name='jf_estimate_noise_')
+    integer(ip), intent(in) :: n_entries, n_freq, n_pairs, robust
+    real(c_double), intent(in) :: floor_shape(n_freq)
+    complex(c_double_complex), intent(in) :: h(n_freq, n_entries), smooth(n_freq, n_entries)
+    real(c_double), intent(in) :: share(n_entries), given(n_freq, n_entries)
+    integer(ip), intent(in) :: first(n_pairs), second(n_pairs)
+    real(c_double), intent(in) :: inflation
+    real(c_double), intent(out) :: parts(n_entries, 3), variance(n_freq, n_entries), line_level(n_freq)
+    real(c_double), intent(out) :: line_factor(n_freq)
+    integer(ip), intent(out) :: is_shaped
+    real(c_double), intent(out) :: found
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
+
+    call hold_traps(host)
+    info = check_estimate_noise(n_entries, n_freq, n_pairs, robust, floor_shape, h, smooth, share, given, first, &
+                                second, inflation)
+    if (info == info_good) then
+      call estimate_noise(robust == 1, floor_shape, h, smooth, share, given, first, second, &
+                          inflation, parts, variance, line_level, line_factor, is_shaped, found, info)
+    end if
+    call release_traps(host)
+  end subroutine jf_estimate_noise
+
+  !> How many neighbouring lines carry the noise of one independent line: 1 + 2 sum of the autocorrelations up to the
+  !> first that is not significant; at least 1.
+  !> n_entries   number of FRFs
+  !> n_freq      as above
+  !> noise       noise of unit variance, shape (n_freq, n_entries); in: NaN if it is not to count; out: workspace
+  !> share       part of the noise power that smoothing has taken up, >= 0, 0 if no smooth FRF was subtracted
+  !> inflation   the number
+  !> info        0, -i, -1000 as above
+  subroutine jf_line_correlation(n_entries, n_freq, noise, share, inflation, info) &
+    bind(C, name='jf_line_correlation_')
+    integer(ip), intent(in) :: n_entries, n_freq
+    complex(c_double_complex), intent(inout) :: noise(n_freq, n_entries)
+    real(c_double), intent(in) :: share
+    real(c_double), intent(out) :: inflation
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
+    real(c_double), allocatable :: known(:, :), sizes(:)
+    integer :: stat
+
+    call hold_traps(host)
+    info = check_line_noise(n_entries, n_freq, share, 0.0_c_double, 0_ip)
+    if (info == info_good) then
+      allocate (known(n_freq, n_entries), sizes(n_freq), stat=stat)
+      if (stat /= 0) info = info_no_memory
+    end if
+    if (info == info_good) call line_correlation(noise, share, known, sizes, inflation)
+    call release_traps(host)
+  end subroutine jf_line_correlation
+
+  !> Slow variation of noise over frequency, and outlying lines, of all FRFs together: the mean square on each line is
+  !> compared with its running median.
+  !> n_entries    number of FRFs
+  !> n_freq       as above
+  !> noise        noise of unit variance, shape (n_freq, n_entries)
+  !> inflation    number of neighbouring lines that carry the noise of one independent line, >= 1
+  !> is_residual  1 for measured minus smooth FRFs, in which modes that are missed show, too: long runs of lines count
+  !>              only if they jump from line to line; 0 if not
+  !> line_level   slow variation, shape (n_freq); 1 if none is significant
+  !> line_factor  by how much an outlying line exceeds the lines around, shape (n_freq); 1 for other lines
+  !> info         0, -i, -1000 as above
+  subroutine jf_line_levels(n_entries, n_freq, noise, inflation, is_residual, line_level, line_factor, info) &
+    bind(C, name='jf_line_levels_')
+    integer(ip), intent(in) :: n_entries, n_freq, is_residual
+    complex(c_double_complex), intent(in) :: noise(n_freq, n_entries)
+    real(c_double), intent(in) :: inflation
+    real(c_double), intent(out) :: line_level(n_freq), line_factor(n_freq)
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
+    type(level_space) :: space
+    integer :: stat
+
+    call hold_traps(host)
+    info = check_line_noise(n_entries, n_freq, inflation, 1.0_c_double, is_residual)
+    if (info == info_good) then
+      call prepare_levels(int(n_freq), space, stat)
+      if (stat /= 0) info = info_no_memory
+    end if
+    if (info == info_good .and. size(noise) > 0) &
+      call line_levels(noise, inflation, is_residual == 1, space, line_level, line_factor)
+    call release_traps(host)
+  end subroutine jf_line_levels
+
+  !> Parts of the variance of noise, not negative: E|e|^2 = sum of parts times terms, of each FRF, by maximum likelihood
+  !> for exponentially distributed squares.
+  !> method      'L' maximum of the likelihood; 'R' of two terms robustly, by medians; 'C' of two terms, the second part
+  !>             alike in all FRFs unless the squares clearly show that it differs
+  !> n_terms     number of terms, at most 100
+  !> n_entries   number of FRFs
+  !> n_freq      as above
+  !> squares     |e|^2, >= 0, shape (n_freq, n_entries)
+  !> terms       shape (n_freq, n_entries, n_terms), >= 0; the first is |h|^2 or proportional to it
+  !> parts       shape (n_entries, n_terms)
+  !> info        0, -i, -1000 as above
+  subroutine jf_noise_parts(method, n_terms, n_entries, n_freq, squares, terms, parts, info) &
+    bind(C, name='jf_noise_parts_')
+    character(kind=c_char), intent(in) :: method
+    integer(ip), intent(in) :: n_terms, n_entries, n_freq
+    real(c_double), intent(in) :: squares(n_freq, n_entries), terms(n_freq, n_entries, n_terms)
+    real(c_double), intent(out) :: parts(n_entries, n_terms)
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
+    integer :: stat
+
+    call hold_traps(host)
+    info = check_noise_parts(method, n_terms, n_entries, n_freq)
+    if (info == info_good .and. size(squares) > 0) then
+      if (index('Cc', method) > 0) then
+        call likely_parts(squares, terms, parts, stat)
+      else
+        call noise_parts(index('Rr', method) > 0, squares, terms, parts, stat)
+      end if
+      if (stat /= 0) info = info_no_memory
+    end if
+    call release_traps(host)
+  end subroutine jf_noise_parts
 end module jointfrf

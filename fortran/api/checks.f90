@@ -2,13 +2,14 @@
 !> forms with and without memory of the caller share them. Sizes come before the arrays whose lengths they are: an array
 !> is read only where they are good.
 module jointfrf_checks
-  use, intrinsic :: iso_c_binding, only: c_char, c_double
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_double_complex
   use jointfrf_arguments, only: bad_offsets, bad_size, names, not_finite, out_of_range, repeated, unknown_equation, &
     unknown_order
   use jointfrf_brick, only: is_formulation
   use jointfrf_diagonal_joint, only: most_dofs
   use jointfrf_joint_derivatives, only: most_coupled_dofs, most_coupled_parameters
   use jointfrf_kinds, only: ip, long
+  use jointfrf_line_layout, only: all_finite
   use jointfrf_monte_carlo, only: is_method
   use jointfrf_noise, only: is_kind, is_reference
   use jointfrf_rational_fit, only: most_poles
@@ -17,11 +18,13 @@ module jointfrf_checks
   private
   public :: check_invert, check_solve, check_receptance, check_receptance_banded, check_receptance_modal
   public :: check_couple, check_couple_bodies, check_modify, check_matrices, check_decouple, check_compliance_factors
-  public :: check_compliance_covariance, check_expect_on_joint, check_fit_diagonal_joint, check_joint_forms
+  public :: check_compliance_covariance, check_expect_on_joint, check_fit_diagonal_joint, check_fit_joint, &
+    check_joint_forms, check_start_joint, check_terms
   public :: check_joint_normal_equations
   public :: check_project_on_joint, check_springs
   public :: check_difference_weights, check_central_difference, check_transform, check_pollute, check_monte_carlo
-  public :: check_brick_matrices, check_brick_quality, check_rational_fit, check_relocate_poles
+  public :: check_brick_matrices, check_brick_quality, check_rational_fit, check_relocate_poles, check_smooth_frfs
+  public :: check_estimate_noise, check_line_noise, check_noise_parts
 
 contains
 
@@ -350,6 +353,80 @@ contains
     if (repeated(3*dofs + kinds)) info = -10
   end function check_fit_diagonal_joint
 
+  !> Matrices of order 2 n, or their entries, packed; rows and columns are arguments 5 and 6.
+  pure subroutine check_storage(reciprocal, n, n_row, n_column, info)
+    integer(ip), intent(in) :: reciprocal, n, n_row, n_column
+    integer(ip), intent(inout) :: info
+    logical :: packed
+
+    packed = n_row == entries_of_square(reciprocal, 2_ip, n)
+    if (n_column /= merge(1_long, 2*int(n, long), packed)) info = -6
+    if (.not. packed .and. n_row /= 2*int(n, long)) info = -5
+  end subroutine check_storage
+
+  !> A joint without cross terms whose compliances come first, DOF by DOF; `wrong_dofs` and `wrong_kinds` are codes.
+  pure function check_terms(n, dofs, kinds, wrong_dofs, wrong_kinds) result(info)
+    integer(ip), intent(in) :: n, dofs(:), kinds(:), wrong_dofs, wrong_kinds
+    integer(ip) :: info
+    integer :: i
+
+    info = info_good
+    if (any(kinds < 0 .or. kinds > 2) .or. any(kinds(:n) /= 0) .or. any(kinds(n + 1:) == 0)) info = wrong_kinds
+    if (out_of_range(dofs, n)) info = wrong_dofs
+    if (info /= info_good) return
+    do i = 1, int(n)
+      if (dofs(i) /= i) info = wrong_dofs
+    end do
+    if (info == info_good .and. repeated(3*dofs + kinds)) info = wrong_kinds
+  end function check_terms
+
+  pure function check_fit_joint(trans, reciprocal, n, n_par, n_row, n_column, n_correlated, n_freq, start, patience, &
+                                flexible, farthest, dofs, kinds, omega, spring, x) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: reciprocal, n, n_par, n_row, n_column, n_correlated, n_freq, start, patience, flexible
+    integer(ip), intent(in) :: dofs(:), kinds(:)
+    real(c_double), intent(in) :: farthest, omega(:), spring(:), x(:)
+    integer(ip) :: info
+
+    info = info_good
+    if (not_finite(farthest) .or. farthest < 0.0_c_double) info = -12
+    if (flexible /= 0 .and. flexible /= 1) info = -11
+    if (bad_size(patience)) info = -10
+    if (start < 0 .or. start > 2) info = -9
+    if (bad_size(n_freq)) info = -8
+    if (n_correlated /= 0 .and. n_correlated /= entries_of_square(reciprocal, 2_ip, n)) info = -7
+    call check_storage(reciprocal, n, n_row, n_column, info)
+    if (n_par < n .or. n_par > 3*int(max(n, 0_ip), long)) info = -4
+    if (n < 1 .or. n > most_dofs) info = -3
+    if (reciprocal /= 0 .and. reciprocal /= 1) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info == info_good) info = check_terms(n, dofs, kinds, -13_ip, -14_ip)
+    if (info /= info_good) return
+    if (start > 0 .and. .not. all(abs(x) <= huge(x))) info = -21
+    if (start > 0 .and. .not. all(spring > 0.0_c_double .and. spring <= huge(spring))) info = -20
+    if (.not. all(abs(omega) <= huge(omega))) info = -15
+  end function check_fit_joint
+
+  pure function check_start_joint(trans, reciprocal, n, n_par, n_row, n_column, n_freq, dofs, kinds, omega, spring) &
+    result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: reciprocal, n, n_par, n_row, n_column, n_freq, dofs(:), kinds(:)
+    real(c_double), intent(in) :: omega(:), spring(:)
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -7
+    call check_storage(reciprocal, n, n_row, n_column, info)
+    if (n_par < n .or. n_par > 3*int(max(n, 0_ip), long)) info = -4
+    if (n < 1 .or. n > most_dofs) info = -3
+    if (reciprocal /= 0 .and. reciprocal /= 1) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info == info_good) info = check_terms(n, dofs, kinds, -8_ip, -9_ip)
+    if (info /= info_good) return
+    if (check_springs(spring, -11_ip) /= info_good) info = -11
+    if (.not. all(abs(omega) <= huge(omega))) info = -10
+  end function check_start_joint
+
   pure function check_joint_normal_equations(trans, n, n_par, n_entries, n_freq, rows, columns) result(info)
     character(kind=c_char), intent(in) :: trans
     integer(ip), intent(in) :: n, n_par, n_entries, n_freq, rows(:), columns(:)
@@ -518,4 +595,86 @@ contains
     if (bad_size(n_entries) .or. 4*int(n_entries, long) > huge(0)) info = -2
     if (bad_size(n_poles) .or. n_poles > most_poles) info = -1
   end function check_rational_fit
+
+  pure function check_smooth_frfs(n_entries, n_freq, max_poles, n_start, patience, inflation, freq, h, variance) &
+    result(info)
+    integer(ip), intent(in) :: n_entries, n_freq, max_poles, n_start, patience
+    real(c_double), intent(in) :: inflation, freq(:), variance(:, :)
+    complex(c_double_complex), contiguous, intent(in) :: h(:, :)
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(patience)) info = -5
+    if (not_finite(inflation) .or. (inflation < 1.0_c_double .and. abs(inflation) > 0.0_c_double)) info = -6
+    if (bad_size(n_start) .or. n_start > max_poles) info = -4
+    if (bad_size(max_poles) .or. max_poles < 1 .or. max_poles > most_poles) info = -3
+    if (bad_size(n_freq)) info = -2
+    if (bad_size(n_entries) .or. 4*int(n_entries, long) > huge(0)) info = -1
+    if (info /= info_good .or. size(h) == 0) return
+    if (.not. all(variance > 0.0_c_double .and. variance <= huge(variance))) info = -9
+    if (.not. all_finite(h)) info = -8
+    if (.not. is_rising(freq)) info = -7
+  end function check_smooth_frfs
+
+  !> Of `jf_line_correlation` and `jf_line_levels`, whose third argument is the noise.
+  !> is_flag   of jf_line_levels; 0 of the other
+  pure function check_line_noise(n_entries, n_freq, number, least, is_flag) result(info)
+    integer(ip), intent(in) :: n_entries, n_freq, is_flag
+    real(c_double), intent(in) :: number, least
+    integer(ip) :: info
+
+    info = info_good
+    if (is_flag /= 0 .and. is_flag /= 1) info = -5
+    if (not_finite(number) .or. number < least) info = -4
+    if (bad_size(n_freq)) info = -2
+    if (bad_size(n_entries)) info = -1
+  end function check_line_noise
+
+  pure function check_noise_parts(method, n_terms, n_entries, n_freq) result(info)
+    character(kind=c_char), intent(in) :: method
+    integer(ip), intent(in) :: n_terms, n_entries, n_freq
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -4
+    if (bad_size(n_entries)) info = -3
+    if (n_terms < 1 .or. n_terms > 100 .or. (index('Cc', method) > 0 .and. n_terms /= 2)) info = -2
+    if (index('LlRrCc', method) == 0) info = -1
+  end function check_noise_parts
+
+  pure function check_estimate_noise(n_entries, n_freq, n_pairs, robust, floor_shape, h, smooth, share, given, first, &
+                                     second, inflation) result(info)
+    integer(ip), intent(in) :: n_entries, n_freq, n_pairs, robust, first(:), second(:)
+    real(c_double), intent(in) :: floor_shape(:), share(:), given(:, :), inflation
+    complex(c_double_complex), contiguous, intent(in) :: h(:, :), smooth(:, :)
+    integer(ip) :: info
+
+    info = info_good
+    if (robust /= 0 .and. robust /= 1) info = -4
+    if (bad_size(n_pairs)) info = -3
+    if (bad_size(n_freq)) info = -2
+    if (bad_size(n_entries)) info = -1
+    if (info /= info_good .or. size(h) == 0) return
+    if (not_finite(inflation) .or. inflation < 1.0_c_double) info = -12
+    if (out_of_range(second, n_entries)) info = -11
+    if (out_of_range(first, n_entries)) info = -10
+    if (.not. all(given >= 0.0_c_double .and. given <= huge(given))) info = -9
+    if (.not. all(share >= 0.0_c_double .and. share <= huge(share))) info = -8
+    if (.not. all_finite(smooth)) info = -7
+    if (.not. all_finite(h)) info = -6
+    if (.not. all(floor_shape > 0.0_c_double .and. floor_shape <= huge(floor_shape))) info = -5
+  end function check_estimate_noise
+
+  !> Whether frequencies are finite, not negative, and each is larger than the one before.
+  pure function is_rising(freq) result(rising)
+    real(c_double), intent(in) :: freq(:)
+    logical :: rising
+    integer :: k, n
+
+    n = size(freq)
+    rising = freq(1) >= 0.0_c_double .and. freq(n) > 0.0_c_double .and. freq(n) <= huge(freq)
+    do k = 2, n
+      rising = rising .and. freq(k) > freq(k - 1)
+    end do
+  end function is_rising
 end module jointfrf_checks

@@ -1,7 +1,8 @@
-/* The threads of the BLAS, whichever it is when a program is linked or loaded. The names that control them are weak:
-   null where the BLAS has none. The linker takes nothing out of a static libopenblas.a for their sake: a program that
-   links one and wants its threads held adds -Wl,-u,openblas_get_parallel. Only ELF has such names; elsewhere nothing is
-   held. */
+/* The threads of the BLAS, whichever it is when a program is linked or loaded. The names that control them need not
+   exist. With ELF they are weak, and null where the BLAS has none: the linker takes nothing out of a static libopenblas.a
+   for their sake, and a program that links one and wants its threads held adds -Wl,-u,openblas_get_parallel. On macOS and
+   Windows the names are looked up when the library is loaded; on Windows in the DLL that brings the LAPACK, so that the
+   threads of a BLAS in a static library are not held. */
 #include <stdint.h>
 
 #ifdef __ELF__
@@ -12,6 +13,45 @@ void openblas_set_num_threads(int threads) OPTIONAL(JF_BLAS_PREFIX "openblas_set
 int mkl_set_local(int threads) OPTIONAL("MKL_Set_Num_Threads_Local");
 int64_t blis_get(void) OPTIONAL("bli_thread_get_num_threads");
 void blis_set(int64_t threads) OPTIONAL("bli_thread_set_num_threads");
+#else
+static int (*openblas_get_parallel)(void);
+static int (*openblas_get_num_threads)(void);
+static void (*openblas_set_num_threads)(int threads);
+static int (*mkl_set_local)(int threads);
+static int64_t (*blis_get)(void);
+static void (*blis_set)(int64_t threads);
+
+#ifdef _WIN32
+#include <windows.h>
+__declspec(dllimport) void lapack_routine(void) __asm__(JF_BLAS_PREFIX "zgetrf_");
+
+static void *address_of(const char *name)
+{
+  HMODULE bringer = NULL;
+
+  GetModuleHandleExA(GET_MODULE_HANDLE_EX_FLAG_FROM_ADDRESS | GET_MODULE_HANDLE_EX_FLAG_UNCHANGED_REFCOUNT,
+                     (const char *)(intptr_t)lapack_routine, &bringer);
+  return bringer == NULL ? NULL : (void *)(intptr_t)GetProcAddress(bringer, name);
+}
+#else
+#include <dlfcn.h>
+
+static void *address_of(const char *name)
+{
+  return dlsym(RTLD_DEFAULT, name);
+}
+#endif
+
+__attribute__((constructor)) static void look_up(void)
+{
+  openblas_get_parallel = (int (*)(void))address_of(JF_BLAS_PREFIX "openblas_get_parallel");
+  openblas_get_num_threads = (int (*)(void))address_of(JF_BLAS_PREFIX "openblas_get_num_threads");
+  openblas_set_num_threads = (void (*)(int))address_of(JF_BLAS_PREFIX "openblas_set_num_threads");
+  mkl_set_local = (int (*)(int))address_of("MKL_Set_Num_Threads_Local");
+  blis_get = (int64_t (*)(void))address_of("bli_thread_get_num_threads");
+  blis_set = (void (*)(int64_t))address_of("bli_thread_set_num_threads");
+}
+#endif
 
 /* How an OpenBLAS was built. The count of one built on OpenMP is OpenMP's own and is left alone; it starts no threads in
    threads. One built without threads must not be called by two at once. */
@@ -62,10 +102,3 @@ void jointfrf_release_own_blas_threads(void)
   if (blis_before > 1)
     blis_set(blis_before);
 }
-#else
-int jointfrf_blas_takes_threads(void) { return 1; }
-int jointfrf_get_blas_threads(void) { return 1; }
-void jointfrf_set_blas_threads(int threads) { (void)threads; }
-void jointfrf_hold_own_blas_threads(void) {}
-void jointfrf_release_own_blas_threads(void) {}
-#endif

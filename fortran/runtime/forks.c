@@ -2,13 +2,21 @@
    of OpenMP are not there, and the region would wait for them for ever. Where no more threads can be started, the run-time
    library of OpenMP ends the program. */
 #if defined(_WIN32)
+#include <stdint.h>
+#include <windows.h>
+
 int jointfrf_was_forked(void)
 {
   return 0;
 }
 
+/* Windows has no fork(). FreeLibrary() must not take away the code that threads of OpenMP come back to. */
 void jointfrf_watch_forks(void)
 {
+  HMODULE own;
+
+  GetModuleHandleExA(GET_MODULE_HANDLE_EX_FLAG_FROM_ADDRESS | GET_MODULE_HANDLE_EX_FLAG_PIN,
+                     (const char *)(intptr_t)jointfrf_watch_forks, &own);
 }
 
 int jointfrf_can_start(int threads)

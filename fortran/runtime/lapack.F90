@@ -10,7 +10,7 @@ module jointfrf_lapack
   use jointfrf_kinds, only: blas_ip, dp
   implicit none
   private
-  public :: dgemm, dposv, zgeev, zgesv, zgetrf, zgetri, zgecon, zgbtrf, zgbtrs, zgbcon, zgemm, zgemv
+  public :: dgemm, dposv, dsyev, zgeev, zgesv, zgetrf, zgetri, zgecon, zgbtrf, zgbtrs, zgbcon, zgemm, zgemv
 
   interface
     !> Solve A X = B of a positive definite A by Cholesky's factors.
@@ -23,6 +23,19 @@ module jointfrf_lapack
       integer(blas_ip), intent(out) :: info
       integer(c_size_t), value :: uplo_len
     end subroutine dposv
+
+    !> Eigenvalues, ascending, and eigenvectors of a symmetric matrix, which leaves as the vectors.
+    subroutine dsyev(jobz, uplo, n, a, lda, w, work, lwork, info, jobz_len, uplo_len) &
+      bind(C, name=JF_BLAS_PREFIX//"dsyev_")
+      import :: blas_ip, c_char, c_size_t, dp
+      implicit none
+      character(kind=c_char), intent(in) :: jobz, uplo
+      integer(blas_ip), intent(in) :: n, lda, lwork
+      real(dp), intent(inout) :: a(lda, *)
+      real(dp), intent(out) :: w(*), work(*)
+      integer(blas_ip), intent(out) :: info
+      integer(c_size_t), value :: jobz_len, uplo_len
+    end subroutine dsyev
 
     !> Solve A X = B by LU with partial pivoting; A leaves as its factors.
     subroutine zgesv(n, nrhs, a, lda, ipiv, b, ldb, info) bind(C, name=JF_BLAS_PREFIX//"zgesv_")
