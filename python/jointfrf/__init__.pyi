@@ -4,6 +4,8 @@ from jointfrf import report as report
 from jointfrf import solids as solids
 from jointfrf.amplitude.amplitude_laws import AmplitudeLawFit, AmplitudeLawFits, fit_amplitude_laws
 from jointfrf.amplitude.backbone import Backbone, backbone_levels
+from jointfrf.amplitude.decay import DecayRecord, ModalDecay, decay_of_mode
+from jointfrf.amplitude.decay_levels import decay_levels
 from jointfrf.amplitude.levels import JointLevel, JointLevels, levels
 from jointfrf.amplitude.lines import Drive
 from jointfrf.assembly_file.measured import MeasuredAssembly, measured_assembly
@@ -52,6 +54,7 @@ from jointfrf.frf.noise import pollute, realisations
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.frf.setups import SetUps
 from jointfrf.frf.smoothing import SmoothFrfs, smooth_frfs
+from jointfrf.frf.stated_noise import StatedNoise
 from jointfrf.identification.band_means import identify_band_mean
 from jointfrf.identification.derived import Derived
 from jointfrf.identification.elastic_centre import ElasticCentre, elastic_centre
@@ -79,9 +82,11 @@ from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinear
 from jointfrf.messages.finding import Finding
 from jointfrf.models.beam import beam
 from jointfrf.models.matrices import from_triangle
-from jointfrf.models.model import Model, assemble, chain
-from jointfrf.models.points import rigid_body
+from jointfrf.models.model import Model, assemble, chain, with_modal_damping
+from jointfrf.models.plate import PlateRegion, plate
+from jointfrf.models.points import PointModel, rigid_body
 from jointfrf.models.receptance import ReceptanceInfo, receptance
+from jointfrf.models.regions import NodeRegion, add_regions
 from jointfrf.parallel.pool import BrokenPoolError
 from jointfrf.parallel.sweep import SweepPlan, plan_sweep, sweep
 from jointfrf.planning.assemblies import assemblies_needed, expected_half_width
@@ -149,6 +154,7 @@ __all__ = [
     "ContactLaw",
     "ConvergenceWarning",
     "CopyWarning",
+    "DecayRecord",
     "Derived",
     "DifferenceError",
     "Drive",
@@ -185,13 +191,17 @@ __all__ = [
     "MeasurementPlan",
     "Mesh",
     "MissingPackageError",
+    "ModalDecay",
     "Model",
     "MonteCarlo",
     "MultiPointJoint",
+    "NodeRegion",
     "NoiseModel",
     "ParameterSummary",
     "Patch",
     "PlacedJoint",
+    "PlateRegion",
+    "PointModel",
     "PooledFits",
     "PooledParameter",
     "PowerLaw",
@@ -205,6 +215,7 @@ __all__ = [
     "SolidModel",
     "SpringLaw",
     "StandardLinearSolid",
+    "StatedNoise",
     "StudyDesign",
     "StudyResult",
     "Substructure",
@@ -213,6 +224,7 @@ __all__ = [
     "Unknown",
     "Validation",
     "VirtualPoint",
+    "add_regions",
     "amplitude_error",
     "append_virtual_point",
     "as_bands",
@@ -234,6 +246,8 @@ __all__ = [
     "compliance_factors",
     "couple",
     "couple_bodies",
+    "decay_levels",
+    "decay_of_mode",
     "decouple",
     "difference_error",
     "difference_weights",
@@ -276,6 +290,7 @@ __all__ = [
     "plan",
     "plan_joint_frfs",
     "plan_sweep",
+    "plate",
     "plot",
     "pollute",
     "pool",
@@ -308,6 +323,7 @@ __all__ = [
     "virtual_interface",
     "virtual_point",
     "virtual_points",
+    "with_modal_damping",
     "write_joint",
     "write_levels",
     "write_plan",

@@ -11,6 +11,7 @@ from typing import Literal, cast, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jointfrf.directions import DIRECTIONS, PLACES, direction_names
 from jointfrf.kernel.arguments import FloatArray, as_names, as_real, check_type
 from jointfrf.spelling import did_you_mean, some_of
 
@@ -32,17 +33,6 @@ __all__ = [
     "similar_dof",
 ]
 
-#: The six directions of a point: displacements, then rotations, right-handed.
-DIRECTIONS = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
-
-#: How names of directions begin, before the axis, in small letters; u, f and m as in files and in the thesis.
-_AXES = "xyz"
-_TRANSLATIONS = ("", "u", "u_", "f")
-_ROTATIONS = ("theta_", "theta", "r", "rot_", "rot", "m", "mtheta_", "mtheta")
-#: Position among `DIRECTIONS` by name, small letters.
-_PLACES = {prefix + axis: i for prefix in _TRANSLATIONS for i, axis in enumerate(_AXES)} | {
-    prefix + axis: 3 + i for prefix in _ROTATIONS for i, axis in enumerate(_AXES)
-}
 #: A rotation whose axis the name may leave out, as in a plane: theta, Mtheta, rot1.
 _ROTATION = re.compile(r"m?(theta|phi|rot|r[xyz])", re.IGNORECASE)
 #: What follows the point in the name of a parameter.
@@ -142,7 +132,7 @@ def is_rotation(dof: str) -> bool:
     [False, False, True, True, True, True, False, True]
     """
     dof = point_and_direction(dof)[1]
-    place = _PLACES.get(dof.lower())
+    place = PLACES.get(dof.lower())
     return _ROTATION.match(dof) is not None if place is None else place >= 3
 
 
@@ -248,7 +238,7 @@ def similar_dof(name: str, known: Iterable[str]) -> str:
     if is_rotation(direction):
         here = {one: one[len(node + mark) :] for one in names if one.startswith(node + mark)}
         turns = [one for one, own in here.items() if is_rotation(own)]
-        same = [one for one in turns if _PLACES.get(here[one].lower(), -1) == _PLACES.get(direction.lower())]
+        same = [one for one in turns if PLACES.get(here[one].lower(), -1) == PLACES.get(direction.lower())]
         if turns:
             return f"; did you mean {some_of(same or turns, 3, ' or ')}?"
     return did_you_mean(name, names)
@@ -260,32 +250,9 @@ def compliance_unit(response: str, force: str) -> str:
     return motion + ("/(N m)" if is_rotation(force) else "/N")
 
 
-def direction_names(dofs: Sequence[str]) -> tuple[str, ...]:
-    """Return the names among `DIRECTIONS` of DOFs written in any way that `direction_places` knows."""
-    return tuple(DIRECTIONS[place] for place in direction_places(dofs))
-
-
 def direction_places(dofs: Sequence[str]) -> NDArray[np.intp]:
-    """Return the place of each DOF among `DIRECTIONS`, counted from 0, shape (n,).
-
-    Small or capital letters; x, ux, u_x and the thesis' Fx are displacements; theta_x, thetax, rx, rot_x, Mx and the
-    thesis' Mtheta_x rotations.
-
-    Raises
-    ------
-    ValueError
-        A name that is not known or comes twice.
-    """
-    dofs = as_names("dofs", dofs)
-    names = [dof.lower() for dof in dofs]
-    unknown = [dof for dof, name in zip(dofs, names, strict=True) if name not in _PLACES]
-    if unknown:
-        hint = did_you_mean(unknown[0], DIRECTIONS)
-        raise ValueError(f"dofs must be among {', '.join(DIRECTIONS)}, not {reprlib.repr(unknown[0])}{hint}")
-    places = np.array([_PLACES[name] for name in names], np.intp)
-    if np.unique(places).size != places.size:
-        raise ValueError(f"dofs must name each direction once, not {', '.join(dofs)}")
-    return places
+    """Return the place of each DOF among `DIRECTIONS`, counted from 0, shape (n,); errors as of `direction_names`."""
+    return np.array([DIRECTIONS.index(name) for name in direction_names(as_names("dofs", dofs))], np.intp)
 
 
 def rigid_motion(points: FloatArray, about: FloatArray) -> FloatArray:

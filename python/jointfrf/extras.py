@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -18,9 +20,9 @@ _T = TypeVar("_T")
 #: What each package is for, and the extra of the installation that brings it.
 _EXTRAS = {
     "h5py": ("HDF5 files (MATLAB 7.3 among them)", "hdf5"),
+    "openpyxl": ("Excel workbooks", "xlsx"),
     "jinja2": ("reports", "report"),
     "matplotlib": ("figures", "plot"),
-    "plotly": ("views in space", "report3d"),
     "mumps": ("factors by MUMPS", "mumps"),
     "ansys": (".full files of Ansys", "ansys"),
     "pyyeti": ("OUTPUT2 and OUTPUT4 files of Nastran", "nastran"),
@@ -56,11 +58,11 @@ def import_extra(module: str) -> Any:
     MissingPackageError
         The package is not installed; the message says how to install it.
     """
-    import numpy as np
-
     package = module.partition(".")[0]
     try:
-        with np.printoptions():  # pyYeti sets how arrays print, also those of the program that reads a file by it
+        # pyYeti sets how arrays print, also those of the program that reads a file by it; numpy is there by then.
+        numpy = sys.modules.get("numpy")
+        with nullcontext() if numpy is None else numpy.printoptions():
             return importlib.import_module(module)
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != package:

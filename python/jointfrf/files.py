@@ -13,10 +13,12 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
 from jointfrf.errors import FileContentError, first_line
+from jointfrf.spelling import did_you_mean
 
 __all__ = [
     "HEAD",
@@ -42,8 +44,12 @@ LIMIT_VARIABLE = "JOINTFRF_FILE_LIMIT_GB"
 _LARGEST, _SMALL, _TIMES = 16.0, 1.0, 10
 #: Bytes that each array, group or cell counts at least: a file may consist of millions of empty ones.
 _LEAST = 10_000
+#: Files of a folder among which a name is sought.
+_LISTED = 10_000
 #: Characters that have a meaning to some file system, shell or page, and the longest name.
 _UNUSUAL, _LONGEST = re.compile(r"[^\w+,=.-]", re.ASCII), 100
+#: Names of devices on Windows, in every folder and with any suffix: what is written there is lost.
+_DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.ASCII | re.IGNORECASE)
 #: Where names are those of open files, which cannot be replaced.
 _OPEN_FILES = "/proc/"
 #: What readers of numpy, scipy and h5py raise for a damaged file.
@@ -139,6 +145,16 @@ def check_stated(what: str, size: float) -> None:
         )
 
 
+def _near_name(path: Path) -> str:
+    """Return the end of a sentence that proposes a file of the same folder with nearly this name."""
+    try:
+        listed = islice(path.parent.iterdir(), _LISTED)
+        known = [one.name for one in listed if one.name.isprintable() and one.is_file()]
+    except OSError:
+        return ""
+    return did_you_mean(path.name, known)
+
+
 def check_file(path: Path, limit_gb: float | None = None) -> None:
     """Check that a file can be read to its end: that it is one, and not larger than memory is likely to hold.
 
@@ -156,7 +172,7 @@ def check_file(path: Path, limit_gb: float | None = None) -> None:
         It is a folder, a pipe or a device, or larger than 16 GB, or than another limit where one is given.
     """
     if not path.exists():
-        raise FileNotFoundError("\\n".join(f"there is no file {path}".splitlines()))
+        raise FileNotFoundError("\\n".join(f"there is no file {path}{_near_name(path)}".splitlines()))
     if path.is_dir():
         raise FileContentError(f"{path} is a folder; name a file")
     if not path.is_file():
@@ -257,7 +273,8 @@ def clean_name(name: str, suffix: str = "") -> str:
     ----------
     name : str
         Characters that are unusual in names of files (all but letters and digits of ASCII and ``_+,=.-``), a point at
-        the beginning and the end of a long name are replaced; a checksum is then added, so that two names stay two.
+        the beginning, the end of a long name and names of devices on Windows are replaced; a checksum is then added, so
+        that two names stay two.
     suffix : str
         Suffix of the file, with its point.
 
@@ -268,11 +285,11 @@ def clean_name(name: str, suffix: str = "") -> str:
 
     Examples
     --------
-    >>> clean_name("k-theta"), clean_name("../../x", ".png")
-    ('k-theta', '_._.._x-422533a8.png')
+    >>> clean_name("k-theta"), clean_name("../../x", ".png"), clean_name("nul")
+    ('k-theta', '_._.._x-422533a8.png', '_ul-ab449ff8')
     """
     clean = _UNUSUAL.sub("_", name)[:_LONGEST]
-    clean = f"_{clean[1:]}" if clean[:1] in ("", ".", "-") else clean
+    clean = f"_{clean[1:]}" if clean[:1] in ("", ".", "-") or _DEVICE.fullmatch(clean) else clean
     if clean != name:
         clean += f"-{zlib.crc32(name.encode('utf-8', 'surrogatepass')):08x}"
     return f"{clean}{suffix}"
@@ -503,7 +520,7 @@ def written_whole(path: Path) -> Iterator[Path]:
     into = older is not None and not stat.S_ISREG(older.st_mode)
     into |= target.parent.resolve().as_posix().startswith(_OPEN_FILES)
     if into and target.is_dir():
-        raise IsADirectoryError(21, os.strerror(21), str(path))
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     temporary: Path | None = None
     try:
         folder = Path(tempfile.gettempdir()) if into else target.parent
@@ -541,7 +558,7 @@ def _followed(path: Path) -> Path:
         if not path.is_symlink() or path.parent.resolve().as_posix().startswith(_OPEN_FILES):
             return path
         path = path.parent / path.readlink()
-    raise OSError(40, "too many levels of symbolic links", str(path))
+    raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
 
 
 def _created(folder: Path, name: str, *, private: bool) -> Path:

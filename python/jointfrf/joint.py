@@ -13,7 +13,8 @@ from jointfrf.dofs import rigid_offset
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_array, as_frequency, as_names, as_real
 
 if TYPE_CHECKING:
-    from jointfrf.io.cards import CardFormat, CardOptions
+    from jointfrf.io.card_link import CardFormat
+    from jointfrf.io.cards import CardOptions
 
 __all__ = ["Joint"]
 
@@ -173,24 +174,28 @@ class Joint:
 
         Parameters
         ----------
-        program : {"abaqus", "calculix", "nastran", "ansys"}
+        program : {"abaqus", "calculix", "nastran", "ansys", "code_aster", "lsdyna", "subdyn"}
             Whose input. Abaqus: SPRING2 (complex with hysteretic damping) and DASHPOT2, or MATRIX INPUT where DOFs are
-            coupled or nodes lie beside the joint. CalculiX: SPRING2, SPRING1. Nastran: CBUSH and PBUSH, or DMIG where
-            DOFs are coupled. Ansys: MATRIX27.
+            coupled or nodes are away from the joint. CalculiX: SPRING2, SPRING1. Nastran: CBUSH and PBUSH, or DMIG
+            where DOFs are coupled. Ansys: MATRIX27. Code_Aster: DISCRET of K_TR_L and A_TR_L. LS-DYNA: a discrete beam,
+            or DMIG where DOFs are coupled or nodes are away from the joint. SubDyn: a spring element, no damping.
         nodes : sequence of two int
-            Nodes j on A and k on B. Directions are the global ones (Ansys: those of the nodal coordinate systems).
+            Nodes j on A and k on B. Directions are the global ones; Ansys takes the nodal coordinate systems.
         element, number : int
             (1) First number of the new elements; first number of property, type and real constants, and part of names.
         rotation_nodes : sequence of two int, optional
             CalculiX only, and needed there for rotations: the ROT NODEs of rigid bodies whose REF NODEs are `nodes`.
         damping : bool
             Whether damping is written (by default it is).
+        damping_nodes : int, optional
+            CalculiX only, and needed there for viscous damping: first number of the auxiliary nodes of dashpots, two
+            for each.
         full_matrix : bool
             Whether matrices are written where springs would do: Abaqus, Nastran.
         positions : array_like, shape (2, 3), optional
             Where the two nodes are in the model, in its unit of length; rigid arms then lead from them to `points`.
         points : array_like, shape (3,) or (2, 3), optional
-            Reference point of the joint, or those of its sides j and k, in the same unit, with `positions`; by default
+            Reference point of the joint, or one for each side j and k, in the same unit, with `positions`; by default
             midway between the nodes. It is stated in a comment.
         units : {"SI", "mm-t-s", "mm-kg-ms"}
             Units of the model: m, N, s (default); mm, N, s; mm, kN, ms. Arms of more than 10 m are an error.
@@ -204,20 +209,21 @@ class Joint:
             matrices. Both sides have one reference point, and there is no hysteretic damping but in a table.
         table_hz : array_like, optional
             Frequencies of tables, Hz, above 0: Re K* and Im K*/w over frequency, for direct steady-state steps. Abaqus:
-            SPRING2 and DASHPOT2 with frequencies, or a connector element where DOFs are coupled or nodes lie beside the
-            joint. Nastran: PBUSHT and TABLED1, not where DOFs are coupled.
+            SPRING2 and DASHPOT2 with frequencies, or a connector element where DOFs are coupled or nodes are away from
+            the joint. Nastran: PBUSHT and TABLED1, not where DOFs are coupled. Code_Aster: a dictionary of DISCRET by
+            frequency.
 
         Returns
         -------
         str
-            Lines of input; numbers have 14 digits, or as many as their field takes (9 at least).
+            Lines of input; numbers have 14 digits, or as many as their field takes (9 at least, in LS-DYNA 4).
 
         Raises
         ------
         ValueError
             DOFs whose names do not name a direction; matrices that are not symmetric; numbers out of range; what
-            the program does not support: damping in CalculiX, hysteretic damping in Ansys, rotations of CalculiX
-            without `rotation_nodes`.
+            the program does not support: hysteretic damping in CalculiX, Ansys and LS-DYNA, any damping in SubDyn,
+            rotations of CalculiX without `rotation_nodes`.
 
         Notes
         -----

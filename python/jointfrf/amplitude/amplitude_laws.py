@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.amplitude.friction import bouc_wen, iwan, jenkins
+from jointfrf.choices import AMPLITUDE_LAWS
 from jointfrf.identification.result import columns_of
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, as_probability, as_real, check_choice
 
@@ -25,6 +26,10 @@ _FAR = 14.0
 _ROUNDING = 1e-12
 #: Residuals rarer than this by chance are those of a law that is not the joint's, or of errors that are too small.
 _CHANCE = 1e-3
+#: Logarithmic distance from the best at least, and evaluations, at which a profile is taken.
+_BEND, _PROFILE = 0.1, 100
+#: Share of each variance that is independent at least, so that the covariance has an inverse.
+_OWN = 1e-6
 #: Values and errors lie within these, so that no square of a ratio overflows.
 _LEAST, _MOST = 1e-30, 1e30
 
@@ -67,8 +72,6 @@ _LAWS = {
         lambda a, spring, k, limit, loss: spring + bouc_wen(a, k, limit) + 1j * loss * (spring + k),
     ),
 }  # fmt: skip
-#: Names of the laws.
-AMPLITUDE_LAWS = tuple(_LAWS)
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,7 @@ class AmplitudeLawFit:
         Of the parameters; symmetric in the logarithm of stiffness, force and displacement. 0 .. inf where the data
         do not determine a parameter.
     chi_square, degrees : float, int
-        Squared residuals in units of the standard errors, and their number less that of parameters.
+        Squared residuals in the metric of the covariance of the levels, and their degrees of freedom.
     widened : float
         By how much intervals are wider than the standard errors alone make them: the root of chi_square / degrees
         where chance has less than one in a thousand such residuals, else 1.
@@ -124,11 +127,16 @@ class AmplitudeLawFits:
         """Return a table of the laws, and one of the parameters of the best."""
         best = self.fits[0]
         laws = [("law", "AICc", "BIC", "chi^2", "degrees of freedom")]
-        laws += [(f.law, f"{f.aicc:.1f}", f"{f.bic:.1f}", f"{f.chi_square:.3g}", str(f.degrees)) for f in self.fits]
+        laws += [(f.law, _shown(f.aicc), _shown(f.bic), f"{f.chi_square:.3g}", str(f.degrees)) for f in self.fits]
         rows = [(f"parameter of {best.law}", "value", "interval")]
         rows += [(n, f"{v:.4g}", "{:.4g} .. {:.4g}".format(*best.intervals[n])) for n, v in best.values.items()]
         said = [f"{law}: {why}" for law, why in self.left_out.items()]
         return "\n\n".join("\n".join(lines) for lines in (columns_of(laws), columns_of(rows), said) if lines)
+
+
+def _shown(criterion: float) -> str:
+    """Return a criterion with one decimal; of large ones, four digits are more than the data state."""
+    return f"{criterion:.1f}" if abs(criterion) < 1000 else f"{criterion:.4g}"
 
 
 def fit_amplitude_laws(
@@ -138,6 +146,7 @@ def fit_amplitude_laws(
     stiffness_error: ArrayLike,
     loss_factor_error: ArrayLike,
     *,
+    common: ArrayLike | None = None,
     laws: Iterable[str] = AMPLITUDE_LAWS,
     probability: float = 0.95,
 ) -> AmplitudeLawFits:
@@ -150,7 +159,10 @@ def fit_amplitude_laws(
     stiffness, loss_factor : array_like, shape (n_levels,)
         Of the joint at each level, N/m and 1.
     stiffness_error, loss_factor_error : array_like, shape (n_levels,)
-        Standard errors, independent between levels.
+        Standard errors.
+    common : array_like, shape (n_errors, 2, n_levels), optional
+        Changes of stiffness and loss factor by one standard deviation of each error that all levels share, such as the
+        error of a modulus. By default errors are independent between levels.
     laws : iterable of {"constant", "power", "jenkins", "iwan", "bouc-wen"}
         "power" has a constant stiffness, and a loss factor that goes with a power of the amplitude ("loss_factor" is
         that at the median amplitude); "iwan" is Segalman's element; "jenkins" and "bouc-wen" (n = 1, beta = gamma)
@@ -169,7 +181,7 @@ def fit_amplitude_laws(
 
     Notes
     -----
-    Residuals are those of ln k and of eta, divided by their standard errors; intervals come from their derivatives.
+    The residuals of ln k and of eta are whitened by their covariance; intervals come from their derivatives.
     Stiffness and loss factor are those of the first harmonic, which FRFs of stepped sines show.
 
     Examples
@@ -193,13 +205,15 @@ def fit_amplitude_laws(
     for law in chosen:
         check_choice("laws", law, AMPLITUDE_LAWS)
     share = as_probability("probability", probability)
+    columns = np.zeros((0, 2, a.size)) if common is None else as_real("common", common, (None, 2, a.size))
+    white = _whitening(np.array([dk / k, d_eta]), columns / np.array([k, np.ones(a.size)]))
     fits, left_out = [], {}
     for law in chosen:
         count = len(_LAWS[law].names)
         if 2 * a.size - count - 1 <= 0:
             left_out[law] = f"{count} parameters need at least {count // 2 + 1} levels, not {a.size}"
         else:
-            fits.append(_fit(law, a, k, eta, dk / k, d_eta, share))
+            fits.append(_fit(law, a, k, eta, white, share))
     if not fits:
         raise ValueError(
             f"{a.size} levels are too few for the laws {', '.join(chosen) or '(none)'}; give more levels or fewer laws"
@@ -216,9 +230,34 @@ def _positive(name: str, value: ArrayLike, size: int | None) -> FloatArray:
     return array
 
 
-def _fit(
-    law: str, a: FloatArray, k: FloatArray, eta: FloatArray, dk: FloatArray, d_eta: FloatArray, share: float
-) -> AmplitudeLawFit:
+def _whitening(errors: FloatArray, common: FloatArray) -> FloatArray:
+    """Return the inverse root of the covariance of ln k and eta, shape (2 n, 2 n), by errors (2, n) and common parts.
+
+    What errors have beyond the common parts is independent; at least a share of rounding is.
+    """
+    columns, variance = common.reshape(len(common), errors.size), np.square(errors).ravel()
+    own = np.maximum(variance - np.square(columns).sum(axis=0), _OWN * variance)
+    root = np.linalg.cholesky(np.diag(own) + columns.T @ columns)
+    return np.asarray(np.linalg.inv(root))
+
+
+def _profile(
+    residual: Callable[[FloatArray], FloatArray], best: FloatArray, bounds: FloatArray, i: int, value: float
+) -> float:
+    """Return the least chi-square with one parameter at another value."""
+    from scipy.optimize import least_squares
+
+    def of_rest(rest: FloatArray) -> FloatArray:
+        return residual(np.insert(rest, i, value))
+
+    return 2 * float(
+        least_squares(
+            of_rest, np.delete(best, i), bounds=np.delete(bounds, i, 1), x_scale="jac", max_nfev=_PROFILE
+        ).cost
+    )
+
+
+def _fit(law: str, a: FloatArray, k: FloatArray, eta: FloatArray, white: FloatArray, share: float) -> AmplitudeLawFit:
     from scipy.optimize import least_squares
     from scipy.special import chdtrc, ndtri
 
@@ -232,7 +271,7 @@ def _fit(
     def residual(x: FloatArray) -> FloatArray:
         found = of_law(x)
         real = np.maximum(found.real, _ROUNDING * k)
-        return np.concatenate([(np.log(real) - np.log(k)) / dk, (found.imag / real - eta) / d_eta])
+        return np.asarray(white @ np.concatenate([np.log(real) - np.log(k), found.imag / real - eta]))
 
     best = None
     for slip in _STARTS:
@@ -243,7 +282,7 @@ def _fit(
             low[own.names.index("chi")], high[own.names.index("chi")] = _CHI
         run = least_squares(residual, x, bounds=(low, high), x_scale="jac")
         if best is None or run.cost < best.cost:
-            best = run
+            best, bounds = run, np.array([low, high])
     assert best is not None
     _, values, rows = np.linalg.svd(best.jac, full_matrices=False)
     # A direction that changes no residual by more than rounding has an error beyond all bounds, not none.
@@ -258,6 +297,12 @@ def _fit(
         ends = (float(x - half), float(x + half))
         if logarithmic:  # beyond a factor of exp(7) to either side the data do not determine it
             ends = (math.exp(ends[0]), math.exp(ends[1])) if half < _FAR / 2 else (0.0, math.inf)
+            if half < _FAR / 2:  # nor do they where the residual hardly grows: the law may have a bend at its best
+                i, most = own.names.index(name), chi_square + (widened * float(ndtri((1 + share) / 2))) ** 2
+                far = [
+                    _profile(residual, best.x, bounds, i, x + side * max(2 * half, _BEND)) < most for side in (-1, 1)
+                ]
+                ends = (0.0 if far[0] else ends[0], math.inf if far[1] else ends[1])
         limits[name] = ends
     return AmplitudeLawFit(
         law, parameters, limits, chi_square, n - count, widened,

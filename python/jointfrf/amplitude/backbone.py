@@ -44,7 +44,7 @@ class Backbone:
     Parameters
     ----------
     channel : str
-        DOF whose amplitude is given, ``"A/1:y"``.
+        DOF whose amplitude is given, ``"A/1:y"``; empty for the relative motion in the joint itself (with `damping`).
     freq_hz : array_like, shape (n,)
         Frequency of the mode, Hz: of a free decay that of the undamped mode, |s| / (2 pi).
     amplitude : array_like, shape (n,)
@@ -53,10 +53,12 @@ class Backbone:
         Damping ratio.
     force : array_like, shape (n,), optional
         Of tests at phase resonance: the force that acts at the channel, which lags it by 90 degrees, peak, N or N m.
-    freq_error, damping_error : float
+    freq_error, damping_error : float or array_like, shape (n,)
         Relative standard errors of the frequency, and of damping or of amplitude over force.
     labels : sequence of str, optional
         By default the numbers of the points.
+    shared_error : tuple of float
+        Relative standard errors of frequency and of damping (or force) that all points share, default none.
 
     Examples
     --------
@@ -70,9 +72,10 @@ class Backbone:
     amplitude: FloatArray
     damping: FloatArray | None = None
     force: FloatArray | None = None
-    freq_error: float = 0.001
-    damping_error: float = 0.05
+    freq_error: float | FloatArray = 0.001
+    damping_error: float | FloatArray = 0.05
     labels: tuple[str, ...] = field(default=())
+    shared_error: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         check_type("channel", self.channel, str)
@@ -89,7 +92,15 @@ class Backbone:
         if self.damping is not None and (self.damping >= 1).any():
             raise ValueError("damping has a ratio of 1 or more; give ratios below 1")
         for name in ("freq_error", "damping_error"):
-            object.__setattr__(self, name, float(as_probability(name, getattr(self, name))))
+            error = as_real(name, np.broadcast_to(getattr(self, name), freq.shape), (freq.size,))
+            if (error <= 0).any() or (error >= 1).any():
+                raise ValueError(f"{name} is {one_line(getattr(self, name))}; give errors between 0 and 1")
+            object.__setattr__(self, name, error)
+        shared = as_real("shared_error", self.shared_error, (2,))
+        if (shared < 0).any() or (shared >= 1).any():
+            raise ValueError(f"shared_error is {one_line(self.shared_error)}; give two errors from 0 to 1")
+        if self.force is not None and not self.channel:
+            raise ValueError("channel is empty; name the DOF at which the force acts")
         named = tuple(self.labels) if self.labels else tuple(str(i) for i in range(1, freq.size + 1))
         if len(named) != freq.size or not all(isinstance(one, str) for one in named):
             raise ValueError(f"labels are {one_line(self.labels)}; give {freq.size} names, one for each point")
@@ -152,11 +163,11 @@ def backbone_levels(
     """
     check_type("whole", whole, Assembly)
     check_type("backbone", backbone, Backbone)
-    share, chosen, own = as_probability("probability", probability), check_laws(laws), _dof(whole, dof)
+    share, chosen, own = as_probability("probability", probability), check_laws(laws), dof_of_joint(whole, dof)
     for name, part in (("A", whole.a), ("B", whole.b)):
         if isinstance(part.source, FrfSource):
             raise ValueError(f"{name} is given by FRFs; give models of both parts for a backbone")
-    whole.check([backbone.channel], "channel")
+    whole.check([backbone.channel] if backbone.channel else [], "channel")
     with np.errstate(all="ignore"):  # what is not finite is looked for
         points, findings = _points(whole, backbone, own), list[Finding]()
     for one, label in zip(points, backbone.labels, strict=True):
@@ -172,10 +183,11 @@ def backbone_levels(
     if wrong:
         findings.append(Finding("mode-not-in-models", {"levels": tuple(wrong)}, (own,)))
     around = whole.joint if isinstance(whole.joint, LawJoint) else None
-    return of_levels({own: found}, {}, findings, chosen, share, dict.fromkeys(backbone.labels, around))
+    return of_levels({own: found}, findings, chosen, share, dict.fromkeys(backbone.labels, around))
 
 
-def _dof(whole: Assembly, dof: str | None) -> str:
+def dof_of_joint(whole: Assembly, dof: str | None) -> str:
+    """Return the joint DOF to be found: the one named, or the only one that has a law."""
     known = [a for a, b in whole.joint.laws if a == b]
     if dof is None and len(known) == 1:
         return known[0]
@@ -213,29 +225,42 @@ def _unknowns(whole: Assembly) -> Iterator[tuple[str, float | None, Callable[[fl
 
 
 class _Point(NamedTuple):
-    """K* of a level, relative motion in the joint, standard errors of stiffness and loss factor."""
+    """K* of a level, motion in the joint, standard errors of stiffness and loss factor, and parts by each unknown."""
 
     k: complex
     motion: float
     errors: FloatArray
+    common: dict[str, tuple[float, float]]
 
 
 def _points(whole: Assembly, backbone: Backbone, dof: str) -> list[_Point]:
     """Return K* of all levels with its errors, by central differences."""
     k, motion = _stiffness(whole, backbone, dof)
-    steps = []
     second = "force" if backbone.damping is None else "damping"
-    for name, error in (("freq_hz", backbone.freq_error), (second, backbone.damping_error)):
-        ends = [
-            _stiffness(whole, replace(backbone, **{name: getattr(backbone, name) * (1 + sign * _STEP * error)}), dof)[0]
+
+    def change(name: str, error: float | FloatArray) -> FloatArray:
+        value = getattr(backbone, name)
+        return _slopes(*(
+            _stiffness(whole, replace(backbone, **{name: value * (1 + sign * _STEP * error)}), dof)[0]
             for sign in (1, -1)
-        ]
-        steps.append(_slopes(*ends))
-    for _, std, changed in _unknowns(whole):
+        ))  # fmt: skip
+
+    own = [change("freq_hz", backbone.freq_error), change(second, backbone.damping_error)]
+    common = {
+        f"{name} of all points": change(name, error)
+        for name, error in zip(("freq_hz", second), backbone.shared_error, strict=True)
+        if error
+    }
+    for name, std, changed in _unknowns(whole):
         if std is not None:
-            steps.append(_slopes(*(_stiffness(changed(sign * _STEP * std), backbone, dof)[0] for sign in (1, -1))))
-    errors = np.sqrt(np.sum(np.square(steps), axis=0))
-    return [_Point(complex(k[i]), float(motion[i]), errors[:, i]) for i in range(k.size)]
+            ends = [_stiffness(changed(sign * _STEP * std), backbone, dof)[0] for sign in (1, -1)]
+            common[name] = _slopes(*ends)
+    errors = np.sqrt(np.sum(np.square([*own, *common.values()]), axis=0))
+    return [
+        _Point(complex(k[i]), float(motion[i]), errors[:, i],
+               {name: (float(each[0, i]), float(each[1, i])) for name, each in common.items()})
+        for i in range(k.size)
+    ]  # fmt: skip
 
 
 def _slopes(above: ComplexArray, below: ComplexArray) -> FloatArray:
@@ -246,17 +271,12 @@ def _slopes(above: ComplexArray, below: ComplexArray) -> FloatArray:
 
 def _stiffness(whole: Assembly, backbone: Backbone, dof: str) -> tuple[ComplexArray, FloatArray]:
     """Return K* of all levels, and the amplitude of the relative motion."""
-    joint, i = whole.joint, whole.joint.dofs.index(dof)
-    laws = dict(joint.laws) | {(dof, dof): SpringLaw(0.0)}
-    opened = whole.with_joint(LawJoint(laws, joint.rigid, joint.mass, joint.dofs))
-    names = [f"A/{whole.a.joint[i]}", f"B/{whole.b.joint[i]}", backbone.channel]
-    across = np.array([[1.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
+    channels = [backbone.channel] if backbone.channel else []
     squared = np.square(backbone.freq_hz)
 
     def at(freq_hz: FloatArray) -> ComplexArray:
         lines, place = np.unique(freq_hz, return_inverse=True)
-        found: ComplexArray = (across @ opened.receptance(lines, names, names) @ across.T)[place]
-        return found
+        return _across(whole, lines, channels, dof)[place]
 
     if backbone.force is not None:
         h = at(backbone.freq_hz)
@@ -267,12 +287,33 @@ def _stiffness(whole: Assembly, backbone: Backbone, dof: str) -> tuple[ComplexAr
     assert backbone.damping is not None
     spacing = np.clip(backbone.damping, _LEAST, _MOST)
     target = 2j * backbone.damping / spacing
-    h = np.zeros((squared.size, 2, 2), np.complex128)
+    h = np.zeros((squared.size, 1 + len(channels), 1 + len(channels)), np.complex128)
     for point in _POINTS:
         others = _POINTS[point != _POINTS]
         weight = np.prod((target[:, None] - others) / (point - others), axis=1)
         h = h + weight[:, None, None] * at(np.sqrt(squared * (1 + point * spacing)))
-    return -1 / h[:, 0, 0], np.asarray(abs(h[:, 0, 0] / h[:, 1, 0]) * backbone.amplitude)
+    return -1 / h[:, 0, 0], np.asarray(abs(h[:, 0, 0] / h[:, -1, 0]) * backbone.amplitude)
+
+
+def _across(whole: Assembly, lines: FloatArray, channels: list[str], dof: str) -> ComplexArray:
+    """Return receptances between the relative motion of the open joint and channels, shape (n, 1 + m, 1 + m)."""
+    joint, i = whole.joint, whole.joint.dofs.index(dof)
+    laws = dict(joint.laws) | {(dof, dof): SpringLaw(0.0)}
+    opened = whole.with_joint(LawJoint(laws, joint.rigid, joint.mass, joint.dofs))
+    names = [f"A/{whole.a.joint[i]}", f"B/{whole.b.joint[i]}", *channels]
+    across = np.eye(1 + len(channels), len(names), 1)
+    across[0, :2] = 1.0, -1.0
+    found: ComplexArray = across @ opened.receptance(lines, names, names) @ across.T
+    return found
+
+
+def receptances_across(
+    whole: Assembly, freq_hz: FloatArray, channels: Iterable[str], dof: str
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return receptances across the open joint, (n,), and from it to channels, (n, n_channels)."""
+    lines, place = np.unique(freq_hz, return_inverse=True)
+    h = _across(whole, lines, list(channels), dof)[place]
+    return h[:, 0, 0], h[:, 1:, 0]
 
 
 def _level(one: _Point, label: str, share: float) -> JointLevel:
@@ -281,4 +322,4 @@ def _level(one: _Point, label: str, share: float) -> JointLevel:
         Derived(value, float(error), value - t * float(error), value + t * float(error))
         for value, error in zip((one.k.real, one.k.imag / one.k.real), one.errors, strict=True)
     )
-    return JointLevel(label, one.motion, one.motion, one.motion, 0, abs(one.k) * one.motion, k, eta)
+    return JointLevel(label, one.motion, one.motion, one.motion, 0, abs(one.k) * one.motion, k, eta, one.common)

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import ndtri, stdtrit
 
 from jointfrf.amplitude.amplitude_laws import AMPLITUDE_LAWS, AmplitudeLawFits, fit_amplitude_laws
-from jointfrf.amplitude.lines import Bend, DofLines, Drive, lines_of_fit, with_amplitude
+from jointfrf.amplitude.lines import DofLines, Drive, lines_of_fit, with_amplitude
 from jointfrf.dofs import is_rotation
 from jointfrf.identification.derived import Derived
 from jointfrf.identification.result import Fit, columns_of
-from jointfrf.kernel.arguments import as_names, as_probability, check_choice
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, as_probability, check_choice
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
 from jointfrf.messages.finding import Finding, WithFindings, worst_first
 
 __all__ = ["JointLevel", "JointLevels", "check_laws", "levels", "of_levels"]
 
-#: Chance below which K* is taken to change over the lines of a test, and to do so in a way that no fit follows: then
-#: it is refused, which must not befall one linear test in a hundred.
+#: Chance below which K* is taken to change over the lines of a test, and to do so in a way that no power of ln a
+#: follows: then there is a warning, which must not befall one linear test in a hundred.
 _CHANGES, _BENT = 0.05, 1e-4
 #: Powers of ln a that are fitted at most.
 _MOST = 3
@@ -36,7 +38,7 @@ class JointLevel:
     Attributes
     ----------
     label : str
-        Of the test.
+        Name of the test.
     amplitude : float
         Of the relative motion, peak, m or rad, at which the stiffness was found; the geometric mean over the lines by
         their weight in the fit.
@@ -49,6 +51,8 @@ class JointLevel:
         In the joint, peak, N or N m: |K*| times the amplitude.
     stiffness, loss_factor : Derived
         With standard error and interval; N/m or N m/rad, and 1.
+    common : dict of str to (float, float)
+        Parts of both standard errors that all levels share, with their signs, by the unknown of the models.
     """
 
     label: str
@@ -59,6 +63,7 @@ class JointLevel:
     force: float
     stiffness: Derived
     loss_factor: Derived
+    common: dict[str, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -71,8 +76,8 @@ class JointLevels(WithFindings):
         By DOF, lowest amplitude first.
     laws : dict of str to AmplitudeLawFits
         Of the DOFs that have levels enough.
-    refused : dict of str to str
-        Tests that are not in `levels`, by their labels, and why.
+    left_out : dict of str to str
+        Tests that the command could not read or fit, by their files, and why.
     findings : tuple of Finding
     probability : float
         Of the intervals.
@@ -84,7 +89,7 @@ class JointLevels(WithFindings):
 
     levels: dict[str, tuple[JointLevel, ...]]
     laws: dict[str, AmplitudeLawFits]
-    refused: dict[str, str]
+    left_out: dict[str, str]
     findings: tuple[Finding, ...]
     probability: float = 0.95
     joints: dict[str, LawJoint] = field(default_factory=dict)
@@ -112,7 +117,7 @@ def level_rows(dof: str, own: Sequence[JointLevel], probability: float) -> list[
         k, eta = one.stiffness, one.loss_factor
         rows.append((
             one.label, f"{one.amplitude:.4g}", f"{one.lowest:.3g} .. {one.highest:.3g}", f"{one.force:.4g}",
-            f"{k.value:.5g}", f"{k.low:.5g} .. {k.high:.5g}", f"{eta.value:.4g}", f"{eta.low:.4g} .. {eta.high:.4g}",
+            f"{k.value:.5g}", f"{k.low:.5g} .. {k.high:.5g}", f"{eta.value:.4g}", f"{eta.low:.3g} .. {eta.high:.3g}",
         ))  # fmt: skip
     return rows
 
@@ -149,7 +154,7 @@ def levels(
     ------
     ValueError
         Numbers of fits, drives and labels that differ; a fit without FRFs; a drive that does not belong to its fit; a
-        joint without springs; no test whose FRFs follow the amplitude.
+        joint without springs.
 
     Notes
     -----
@@ -159,8 +164,10 @@ def levels(
 
     Where the amplitude changes over the lines by more than 1 %, fits with models are made again with K* linear in
     ln a, of the second and third power where these show (chance below 5 %, by the residual projected on dH/dK* times
-    the next power beside all parameters); values are those at the amplitude of the level. Where that is not enough
-    (chance below 1e-4), or there are no models, the test is left out.
+    the next power beside all parameters); values are those at the amplitude of the level. What the powers miss, or all
+    of it where there are no models, is a random departure of K* on each of some classes of amplitude. Its variance is
+    estimated from the residual (moments), and belongs to the intervals, which then cover K* over the amplitudes of the
+    test. A chance of the departures below 1e-4 is a warning.
 
     Examples
     --------
@@ -181,7 +188,7 @@ def levels(
     share, named = as_probability("probability", probability), _labels(fits, drives, labels)
     chosen = check_laws(laws)
     found: dict[str, list[JointLevel]] = {}
-    refused, findings, around = dict[str, str](), list[Finding](), dict[str, LawJoint | None]()
+    findings, around = list[Finding](), dict[str, LawJoint | None]()
     for fit, drive, label in zip(fits, drives, named, strict=True):
         try:
             one = _followed(fit, drive)
@@ -189,17 +196,11 @@ def levels(
             raise ValueError(f"{label}: {error}") from error
         if not one.lines:
             raise ValueError(f"{label}: no joint DOF is a spring with a stiffness; use a law spring for one DOF")
-        if one.rejected:
-            refused[label] = "; ".join(each.text for each in one.rejected)
-            findings += [replace(each, test=label) for each in one.rejected]
-            continue
-        findings += _of_fit(one, label)
+        findings += [*(replace(each, test=label) for each in one.doubts), *_of_fit(one, label)]
         around[label] = one.fit.laws
         for dof in one.lines:
             found.setdefault(dof, []).append(_level(one, dof, label, share))
-    if not found:
-        raise ValueError(f"every test is amplitude-dependent: {next(iter(refused.values()))}")
-    return of_levels(found, refused, findings, chosen, share, around)
+    return of_levels(found, findings, chosen, share, around)
 
 
 def check_laws(laws: Iterable[str]) -> tuple[str, ...]:
@@ -212,7 +213,6 @@ def check_laws(laws: Iterable[str]) -> tuple[str, ...]:
 
 def of_levels(
     found: Mapping[str, Sequence[JointLevel]],
-    refused: dict[str, str],
     findings: list[Finding],
     laws: Sequence[str],
     share: float,
@@ -238,7 +238,7 @@ def of_levels(
         if why:
             findings.append(Finding("law-not-fitted", {"reason": why}, (dof,)))
     joints = {label: joint for label, one in around.items() if (joint := _secant(found, label, one)) is not None}
-    return JointLevels(ordered, of_laws, refused, worst_first(findings), share, joints)
+    return JointLevels(ordered, of_laws, {}, worst_first(findings), share, joints)
 
 
 def _secant(found: Mapping[str, Sequence[JointLevel]], label: str, around: LawJoint | None) -> LawJoint | None:
@@ -267,12 +267,12 @@ def _labels(fits: Sequence[Fit], drives: Sequence[Drive], labels: Sequence[str] 
 
 
 class _Followed(NamedTuple):
-    """A fit whose K* follows the amplitude: its lines and orders in ln a by DOF, and DOFs whose K* does not follow."""
+    """A fit whose K* follows the amplitude: its lines and orders in ln a by DOF; where K* departs from them."""
 
     fit: Fit
     lines: dict[str, DofLines]
     orders: dict[str, int]
-    rejected: list[Finding]
+    doubts: list[Finding]
 
 
 def _followed(fit: Fit, drive: Drive) -> _Followed:
@@ -288,9 +288,11 @@ def _followed(fit: Fit, drive: Drive) -> _Followed:
             if changed is None:
                 break
             (fit, lines), orders = changed, more
-    rejected = [_not_smooth(dof, own, bend) for dof, own in lines.items()
-                if (bend := own.bend(orders[dof] + 1)).p_value < _BENT]  # fmt: skip
-    return _Followed(fit, lines, orders, rejected)
+    chances = {
+        dof: min(own.excess(orders[dof]).p_value, own.bend(orders[dof] + 1).p_value) for dof, own in lines.items()
+    }
+    doubts = [_not_smooth(dof, lines[dof], chance) for dof, chance in chances.items() if chance < _BENT]
+    return _Followed(fit, lines, orders, doubts)
 
 
 def _refitted(
@@ -318,21 +320,81 @@ def _of_fit(one: _Followed, label: str) -> list[Finding]:
     return [replace(each, test=label) for each in found if not own & set(each.about)]
 
 
-def _not_smooth(dof: str, own: DofLines, bend: Bend) -> Finding:
+def _not_smooth(dof: str, own: DofLines, chance: float) -> Finding:
     low, high = own.range()
-    return Finding("amplitude-not-smooth", {"low": low, "high": high, "chance": bend.p_value}, (dof,))
+    return Finding("amplitude-not-smooth", {"low": low, "high": high, "chance": chance}, (dof,))
 
 
 def _level(one: _Followed, dof: str, label: str, share: float) -> JointLevel:
-    fit, own = one.fit, one.lines[dof]
+    fit, own, order = one.fit, one.lines[dof], one.orders[dof]
     k = fit.derived(f"{{k_{dof}}}", share)
     names = {each.name for each in fit.parameters}
     terms = {f"h_{dof}": "", f"c_{dof}": f"{own.omega!r} * "}
     lossy = " + ".join(f"{factor}{{{name}}}" for name, factor in terms.items() if name in names)
-    eta = fit.derived(f"({lossy}) / {{k_{dof}}}", share) if lossy else Derived(0.0, 0.0, 0.0, 0.0)
+    if lossy:
+        eta = fit.derived(f"({lossy}) / {{k_{dof}}}", share)
+    else:  # the fit has no damping of this DOF: that of its residual
+        mean, error = own.departures(order).mean
+        eta = _normal(mean.imag / k.value, error / abs(k.value), share)
+    excess = own.excess(order)
+    of_k, of_damping = np.sqrt(excess.variance).tolist()
+    k, eta = (
+        _wider(k, of_k, excess.degrees, share),
+        _wider(eta, math.hypot(of_damping, eta.value * of_k) / abs(k.value), excess.degrees, share),
+    )
+    if any(dof in each.about for each in one.doubts):
+        over = _over_classes(one, dof, k.value, eta.value, excess.expected)
+        k, eta = _with_range(k, over.real), _with_range(eta, over.imag / over.real)
     a = own.mean_amplitude
     force = a * k.value * float(abs(1 + 1j * eta.value))
-    return JointLevel(label, a, *own.range(), one.orders[dof], force, k, eta)
+    return JointLevel(label, a, *own.range(), order, force, k, eta, _common(fit, dof, own.omega, eta.value))
+
+
+def _common(fit: Fit, dof: str, omega: float, eta: float) -> dict[str, tuple[float, float]]:
+    """Return the errors of stiffness and loss factor by one standard deviation of each prior of the models.
+
+    With C the covariance, s the standard deviation of a prior: C[k, p] / s. Levels of one assembly share the prior.
+    """
+    names = [one.name for one in fit.parameters]
+    k = names.index(f"k_{dof}")
+    lossy = {names.index(name): factor for name, factor in ((f"h_{dof}", 1.0), (f"c_{dof}", omega)) if name in names}
+    found = {}
+    for i, one in enumerate(fit.parameters):
+        if one.prior is not None and one.origin != "joint" and np.isfinite(fit.covariance[[k, *lossy], i]).all():
+            of_k, of_h = fit.covariance[k, i], sum(factor * fit.covariance[j, i] for j, factor in lossy.items())
+            size = one.prior[1] * fit.estimate[k]
+            of_eta = (of_h - eta * of_k) / size if lossy else 0.0
+            found[one.name] = (float(of_k / one.prior[1]), float(of_eta))
+    return found
+
+
+def _over_classes(one: _Followed, dof: str, k: float, eta: float, expected: ComplexArray) -> ComplexArray:
+    """Return K* on the classes of amplitude: by the powers of ln a of the fit, and by what they miss."""
+    order = one.orders[dof]
+    x, value = one.lines[dof].departures(order).x, one.fit.value
+    powers = (
+        (value[f"k{i}_{dof}"] + 1j * value[f"h{i}_{dof}"]) * x**i / math.factorial(i) for i in range(1, order + 1)
+    )
+    return np.asarray(k * (1 + 1j * eta) + sum(powers, expected))
+
+
+def _with_range(one: Derived, values: FloatArray) -> Derived:
+    """Return a value whose interval contains others."""
+    return one._replace(low=min(one.low, float(values.min())), high=max(one.high, float(values.max())))
+
+
+def _normal(value: float, error: float, share: float) -> Derived:
+    reach = float(ndtri((1 + share) / 2)) * error
+    return Derived(value, error, value - reach, value + reach)
+
+
+def _wider(one: Derived, error: float, degrees: float, share: float) -> Derived:
+    """Return a value with another error, independent, whose variance was estimated."""
+    if not error > 0:
+        return one
+    reach = float(stdtrit(degrees, (1 + share) / 2)) * error
+    low, high = (one.value + sign * math.hypot(one.value - end, reach) for sign, end in ((-1, one.low), (1, one.high)))
+    return Derived(one.value, math.hypot(one.std_error, error), low, high)
 
 
 def _usable(own: Sequence[JointLevel]) -> tuple[list[JointLevel], str]:
@@ -346,5 +408,13 @@ def _laws(own: Sequence[JointLevel], laws: Iterable[str], share: float) -> Ampli
     k, eta = [one.stiffness for one in own], [one.loss_factor for one in own]
     return fit_amplitude_laws(
         [one.amplitude for one in own], [one.value for one in k], [one.value for one in eta],
-        [one.std_error for one in k], [one.std_error for one in eta], laws=laws, probability=share,
+        [one.std_error for one in k], [one.std_error for one in eta], common=_shared(own), laws=laws,
+        probability=share,
     )  # fmt: skip
+
+
+def _shared(own: Sequence[JointLevel]) -> FloatArray:
+    """Return the errors that levels share, shape (n_errors, 2, n_levels)."""
+    names = dict.fromkeys(name for one in own for name in one.common)
+    found = [[one.common.get(name, (0.0, 0.0)) for one in own] for name in names]
+    return np.array(found, float).reshape(len(names), len(own), 2).swapaxes(1, 2)

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple, Self, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from jointfrf.choices import MotionQuantity
 from jointfrf.dofs import is_rotation
 from jointfrf.identification.fit_data import FitData, ModelData
+from jointfrf.identification.model.uncertainty import ModelLinearised
 from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_positive, check_choice, check_type, one_line
 from jointfrf.laws.law import JointLaw, LawField
@@ -22,9 +24,14 @@ __all__ = ["Bend", "DofLines", "Drive", "lines_of_fit", "with_amplitude"]
 
 #: Amplitudes that differ by less than this, e-fold, are one.
 _HELD = 0.01
+#: Classes of amplitude beyond those that the powers of ln a take: complex degrees of freedom of the departures.
+_CLASSES = 4
+#: Lines that a class has at least.
+_LINES = 3
+#: Eigenvalues of an information below this share of the largest are rounding.
+_RANK = 1e-10
 
 Held = Literal["force", "response", "joint"]
-MotionQuantity = Literal["displacement", "velocity", "acceleration"]
 
 
 @dataclass(frozen=True)
@@ -144,6 +151,90 @@ class Bend(NamedTuple):
     p_value: float
 
 
+class Excess(NamedTuple):
+    """What departures of K* from a polynomial of ln a add to the uncertainty at one amplitude.
+
+    Attributes
+    ----------
+    variance : ndarray, shape (2,)
+        Variance of real and imaginary part, (N/m)^2 or (N m/rad)^2.
+    degrees : float
+        Degrees of freedom of the variance.
+    p_value : float
+        Chance of such departures if there are none.
+    expected : ndarray, shape (n,)
+        Complex departures of the classes, given their variance.
+    """
+
+    variance: FloatArray
+    degrees: float
+    p_value: float
+    expected: ComplexArray
+
+
+@dataclass(frozen=True)
+class Departures:
+    """K* on n classes of amplitude less K* of the fit, estimated next to all other parameters of the fit.
+
+    Attributes
+    ----------
+    information : ndarray, shape (2 n, 2 n)
+        Information on the departures, real parts first, in units of the residual.
+    score : ndarray, shape (2 n,)
+        The departures are `information`^-1 `score`.
+    x : ndarray, shape (n,)
+        Mean of ln (a / centre).
+    residual_degrees : int
+        Degrees of freedom of the residual, in whose units the information is.
+    """
+
+    information: FloatArray
+    score: FloatArray
+    x: FloatArray
+    residual_degrees: int
+
+    @property
+    def mean(self) -> tuple[complex, float]:
+        """The mean departure by one step from the fit, and the standard error of its imaginary part."""
+        columns = np.kron(np.eye(2), np.ones((self.x.size, 1)))
+        inverse = _inverse(columns.T @ self.information @ columns)
+        step = inverse @ columns.T @ self.score
+        return complex(step[0], step[1]), math.sqrt(inverse[1, 1])
+
+    def excess(self, order: int, x: float) -> Excess:
+        """Return what departures from a polynomial of this order add at the amplitude x.
+
+        K* of the classes is X beta + u, u ~ N(0, v): with W the information and P the projection on what X leaves in
+        its metric, E(Q) = degrees + v trace(P) gives v (DerSimonian and Laird). Given v, K* of a class has the
+        precision W + M/v, M the projection on what X leaves of u. What its variance exceeds that for v = 0 by, and
+        the square of its expected departure, are added.
+        """
+        from scipy.special import fdtrc
+
+        n, degrees = self.x.size, 2 * (self.x.size - order - 1)
+        none = np.zeros(n, np.complex128)
+        if degrees <= 0:
+            return Excess(np.zeros(2), 1.0, 1.0, none)
+        columns = np.kron(np.eye(2), np.vander(self.x, order + 1, increasing=True))
+        w, of_powers = self.information, columns.T @ self.score
+        inverse = _inverse(columns.T @ w @ columns)
+        left = float(self.score @ _inverse(w) @ self.score - of_powers @ inverse @ of_powers)
+        trace = float(np.trace(w) - np.trace(inverse @ columns.T @ w @ w @ columns))
+        p_value = float(fdtrc(degrees, self.residual_degrees, max(left, 0.0) / degrees))
+        if left <= degrees or trace <= 0:
+            return Excess(np.zeros(2), float(degrees), p_value, none)
+        basis = np.linalg.qr(columns)[0]
+        variance = _inverse(w + (np.eye(2 * n) - basis @ basis.T) * trace / (left - degrees))
+        more = np.diagonal(variance) - np.einsum("ij,jk,ik->i", columns, inverse, columns)
+        step, own = variance @ self.score, int(np.argmin(abs(self.x - x))) + np.array([0, n])
+        expected = step[:n] + 1j * step[n:]
+        return Excess(np.maximum(more[own], 0.0) + step[own] ** 2, float(degrees), p_value, expected)
+
+
+def _inverse(information: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.pinv(information, rcond=_RANK, hermitian=True))
+
+
 @dataclass(frozen=True)
 class DofLines:
     """A DOF of the joint on the lines of a fit.
@@ -199,6 +290,29 @@ class DofLines:
         if self.is_held:
             return Bend(0j, 1.0)
         return self.source.bend(x)
+
+    def classes(self, order: int) -> NDArray[np.intp]:
+        """Return the class of amplitude of each line and force, by the mean of shares of information and of number.
+
+        There is one class where the amplitude is held or lines are few.
+        """
+        count = min(order + 1 + _CLASSES, len(self.amplitude) // _LINES)
+        if self.is_held or count <= order + 1:
+            return np.zeros(self.amplitude.shape, np.intp)
+        size, rank = self.source.known().ravel(), np.argsort(self.amplitude, axis=None, kind="stable")
+        part = np.empty(size.size)
+        part[rank] = (np.cumsum(size[rank]) - size[rank] / 2) / size.sum()
+        part[rank] = (part[rank] + (np.arange(size.size) + 0.5) / size.size) / 2
+        found = np.minimum((count * part).astype(np.intp), count - 1)
+        return np.unique(found, return_inverse=True)[1].reshape(self.amplitude.shape).astype(np.intp)
+
+    def departures(self, order: int) -> Departures:
+        """Return K* on classes of amplitude less K* of the fit."""
+        return self.source.departures(np.log(self.amplitude / self.centre), self.classes(order))
+
+    def excess(self, order: int) -> Excess:
+        """Return what departures of K* from a polynomial add to the uncertainty at `mean_amplitude`."""
+        return self.departures(order).excess(order, math.log(self.mean_amplitude / self.centre))
 
 
 def lines_of_fit(fit: Fit, drive: Drive) -> dict[str, DofLines]:
@@ -272,6 +386,31 @@ class _ModelLines:
     residual: ComplexArray
     covariance: FloatArray
     places: tuple[int, int | None]
+    of_joint: tuple[int, ...]
+
+    def departures(self, x: FloatArray, codes: NDArray[np.intp]) -> Departures:
+        """By the residual projected on dH/dK* of each class, less what all but the parameters of this DOF explain."""
+        count = int(codes.max()) + 1
+        rows = [(self.slopes * (codes == one)[:, None, :] * unit).ravel() for unit in (1.0, 1j) for one in range(count)]
+        added = np.ascontiguousarray(rows).view(np.float64)
+        others = np.setdiff1d(np.arange(len(self.of_fit)), self.of_joint)
+        own = np.ascontiguousarray(self.of_fit[others]).reshape(others.size, self.residual.size).view(np.float64)
+        residual = np.ascontiguousarray(self.residual).ravel().view(np.float64)
+        known = np.linalg.inv(self.covariance)[np.ix_(others, others)]
+        cross = added @ own.T
+        information = added @ added.T - cross @ np.linalg.solve(known, cross.T)
+        score = added @ residual
+        gain = float(score @ _inverse(information) @ score)
+        left = max(int(np.count_nonzero(residual)) - len(self.of_fit) - 2 * count, 1)
+        level = (float(residual @ residual) - gain) / left
+        means = np.array([x[codes == one].mean() for one in range(count)])
+        return Departures(information / level, score / level, means, left)
+
+    def known(self) -> FloatArray:
+        """Return the information of each line and force on K*, shape (n_freq, n_i)."""
+        size = np.abs(self.slopes) ** 2
+        found: FloatArray = size.reshape(len(size), -1, size.shape[-1]).sum(axis=1)
+        return found
 
     def weights(self) -> FloatArray:
         found = []
@@ -303,6 +442,28 @@ class _JointLines:
     difference: ComplexArray
     shares: FloatArray
     per_force: FloatArray
+
+    def departures(self, x: FloatArray, codes: NDArray[np.intp]) -> Departures:
+        """By the mean of K* of the lines of each class; a line is of the class of the force that moves it most."""
+        weight = self.weights()[0]
+        line = np.arange(len(weight))
+        force = np.argmax(self.per_force, axis=1)
+        share, own, mean = weight.sum(axis=1), codes[line, force], x[line, force]
+        good = (share > 0) & np.isfinite(self.difference)
+        y, w = self.difference[good], share[good] * good.sum()
+        level = float(np.median(w * abs(y) ** 2) / (2 * np.log(2)))
+        count = int(own[good].max()) + 1 if good.any() else 1
+        each = [own[good] == one for one in range(count)]
+        information = np.array([w[one].sum() for one in each]) / level
+        sums = np.array([(w[one] * y[one]).sum() for one in each]) / level
+        means = np.array([mean[good][one].mean() if one.any() else 0.0 for one in each])
+        score = np.concatenate([sums.real, sums.imag])
+        return Departures(np.diag(np.tile(information, 2)), score, means, max(2 * int(good.sum()) - 2 * count, 1))
+
+    def known(self) -> FloatArray:
+        """Return the information of each line and force on K*, shape (n_freq, n_i)."""
+        found: FloatArray = self.weights()[0]
+        return found
 
     def weights(self) -> FloatArray:
         size = self.per_force**2
@@ -337,13 +498,27 @@ def _bend(information: FloatArray, score: FloatArray, squares: float, degrees: i
     return Bend(complex(slope[0], slope[1]), float(fdtrc(2, left, max(gain, 0.0) / 2 / rest)))
 
 
+def _at_the_minimum(at: ModelLinearised) -> ComplexArray:
+    """Return the residual one Newton step from the end of the search, where other parameters have no gradient left."""
+    flat = at.slopes.reshape(len(at.slopes), -1)
+    gradient = (flat.conj() @ at.residual.ravel()).real + at.priors.gradient.sum(axis=0)
+    step = at.covariance @ gradient
+    return np.asarray(at.residual - np.tensordot(step, at.slopes, 1))
+
+
 def _model_lines(fit: Fit, data: ModelData) -> _Motion:
     found = data.joint_motion()
+    residual = _at_the_minimum(found.gradient)
     gradient, sources = found.gradient, dict[str, _ModelLines | _JointLines]()
     for d, dof in enumerate(fit.dofs):
         places = _parameters(fit, dof)
         if places is not None:
-            sources[dof] = _ModelLines(found.slopes[d], gradient.slopes, gradient.residual, gradient.covariance, places)
+            of_joint = tuple(
+                i for i, one in enumerate(fit.parameters) if one.origin == "joint" and one.row == one.column == dof
+            )
+            sources[dof] = _ModelLines(
+                found.slopes[d], gradient.slopes, residual, gradient.covariance, places, of_joint
+            )
     return _Motion(found.per_force, found.predicted, fit.responses, sources)
 
 

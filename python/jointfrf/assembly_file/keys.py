@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any
 
 import msgspec
@@ -10,7 +11,7 @@ from msgspec import field
 
 from jointfrf.assembly_file.modes import ModesKeys
 from jointfrf.cases.structure import ModelStructure, Structure, SubstructureKeys
-from jointfrf.cases.substructures import BeamKeys, BrickBeamKeys, ChainKeys, MatricesKeys, ReceptancesKeys
+from jointfrf.cases.substructures import BeamKeys, BrickBeamKeys, ChainKeys, MatricesKeys, PlateKeys, ReceptancesKeys
 from jointfrf.dofs import DIRECTIONS
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.models.points import rigid_body
@@ -19,6 +20,7 @@ from jointfrf.toml.declared import Keys, NotNegative, Positive, key
 __all__ = [
     "AlikeKeys",
     "AssemblyKeys",
+    "ChannelDofs",
     "GroundKeys",
     "MassKeys",
     "PartKeys",
@@ -27,7 +29,17 @@ __all__ = [
     "Prior",
     "PriorKeys",
     "Unknowns",
+    "without_sign",
 ]
+
+#: A DOF whose direction has a sign.
+_SIGNED = re.compile(r"(.*:)([+-])([^:]+)")
+
+
+def without_sign(dof: str) -> tuple[str, int]:
+    """Return a DOF and its sign: ``A/30:-z`` is ``A/30:z`` and -1."""
+    match = _SIGNED.fullmatch(dof)
+    return (dof, 1) if match is None else (match[1] + match[3], -1 if match[2] == "-" else 1)
 
 
 class PriorKeys(Keys):
@@ -96,6 +108,18 @@ class ChainPart(ChainKeys, tag="chain"):
 
 class BeamPart(BeamKeys, tag="beam"):
     """Beam elements in a line, bending in one plane; DOFs `"1:y"`, `"1:theta"`, ... without those that are held."""
+
+    joint: _JointDofs
+    unknown: _OfNumbers = field(default_factory=dict)
+    exact: _Exact = False
+    model_error: _ModelError = None
+
+
+class PlatePart(PlateKeys, tag="plate"):
+    """A rectangular plate in the plane of x and y, bending in z with shear; DOFs `"1:z"`, `"1:theta_x"`, `"1:theta_y"`.
+
+    Nodes count along x, then y; elements of the fourth degree have 5 x 5 of them.
+    """
 
     joint: _JointDofs
     unknown: _OfNumbers = field(default_factory=dict)
@@ -177,7 +201,7 @@ class RigidBodyPart(SubstructureKeys, tag="rigid-body"):
         return ModelStructure(model)
 
 
-PartKeys = ChainPart | BeamPart | BrickBeamPart | RigidBodyPart | MatricesPart | ReceptancesPart | ModesPart
+PartKeys = ChainPart | BeamPart | PlatePart | BrickBeamPart | RigidBodyPart | MatricesPart | ReceptancesPart | ModesPart
 
 
 class MassKeys(Keys):
@@ -208,11 +232,31 @@ class GroundKeys(Keys):
 _Fixed = Annotated[tuple[str, ...], key("Parameters of joints that keep their value: `c_y`, of several `bolt.c_y`.")]
 _Masses = Annotated[tuple[MassKeys, ...], key("Masses of sensors and shakers.")]
 _Grounds = Annotated[tuple[GroundKeys, ...], key("Springs to the ground.")]
+
+
+class ChannelDofs(Keys):
+    """The DOFs of a channel of a measurement whose sensor and impact differ; a side that is not named is not used."""
+
+    header = "a channel of [channels]"
+    response: Annotated[str | None, key("DOF of the sensor: `A/30:-z`.", absent="not used")] = None
+    force: Annotated[str | None, key("DOF of the force: `A/30:z`.", absent="not used")] = None
+
+    @property
+    def dofs(self) -> tuple[str | None, str | None]:
+        """DOFs of the response and of the force."""
+        return self.response, self.force
+
+
+_Dofs = Annotated[
+    str | ChannelDofs, key("DOF of a channel.", takes="text such as A/151:y, or a table { response, force }")
+]
 _Channels = Annotated[
-    dict[str, str],
-    key('Which channel of the file is which DOF: `"3:+y" = "A/151:y"`; `-y` where it points the other way. '
+    dict[str, _Dofs],
+    key('Which channel of the file is which DOF: `"3:+y" = "A/151:y"`, or `"A/151:-y"` where it points the other way. '
+        'Sensor and force of one name may differ: `"30:+z" = { response = "A/30:-z", force = "A/30:z" }`. '
         '`"A/@0.3,0.006,0:y"`, here and wherever DOFs are named, is the node nearest to a position, m. Channels '
         "that are not named are not used.",
+        takes="table of DOFs, or of tables { response, force }",
         absent="channels that are named like one DOF of one part, `151:y`"),
 ]  # fmt: skip
 _ResponseGains = Annotated[
@@ -250,7 +294,10 @@ class AssemblyKeys(Keys):
 
 
 class PlacedJointKeys(Keys):
-    """One of several joints, between DOFs of two parts, or of one part and the ground."""
+    """One of several joints, between DOFs of two parts, or of one part and the ground.
+
+    If an end is a region of its part, `plate/clamp:z`, its values are per length or area: N/m per m.
+    """
 
     header = "[joints.NAME]"
     j: Annotated[
@@ -264,6 +311,13 @@ class PlacedJointKeys(Keys):
             takes="tables", absent="those of `file`"),
     ] = None  # fmt: skip
     file: Annotated[str | None, key("A joint.toml or a saved joint in place of `law`.", absent="`law`")] = None
+    weight: Annotated[
+        Positive,
+        key(
+            "Factor of its stiffness, damping and mass, such as the length of an edge that belongs to a node; "
+            "of joints that are the `same` the weights may differ."
+        ),
+    ] = 1.0
 
 
 class AlikeKeys(Keys):

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from jointfrf.assembly_file.keys import without_sign
 from jointfrf.assembly_file.read import AssemblyFile, AssemblyPart, check_dofs, read_assembly_file, unknown_of
 from jointfrf.dofs import direction_names
 from jointfrf.errors import FileContentError
 from jointfrf.frf.bands import in_bands
 from jointfrf.frf.frf_set import Channel, FrfSet
 from jointfrf.frf.setups import SetUps
+from jointfrf.frf.stated_noise import StatedNoise
 from jointfrf.identification.identify_model import identify_model
 from jointfrf.identification.model.assembly import AddedMass, Assembly, PlacedJoint
 from jointfrf.identification.model.substructure import Unknown
@@ -89,13 +91,22 @@ class MeasuredAssembly:
         lines += [f"{name}: {line}" for name, part in parts.items() for line in part.describe()]
         return lines + ([f"not used: {', '.join(self.unused)}"] if self.unused else [])
 
-    def fit(self, *, noise: float | None = None, find_wrong_channels: bool = False, accept: Sequence[str] = ()) -> Fit:
+    def fit(
+        self,
+        *,
+        noise: float | StatedNoise | None = None,
+        sensor_mass: float | None = None,
+        find_wrong_channels: bool = False,
+        accept: Sequence[str] = (),
+    ) -> Fit:
         """Identify the joint, as `identify_model` does.
 
         Parameters
         ----------
-        noise : float, optional
-            Relative noise of the FRFs; found from them by default.
+        noise : float or StatedNoise, optional
+            Relative noise of the FRFs, or relative part and floors; estimated from them by default.
+        sensor_mass : float, optional
+            Mass of the accelerometer that moves from point to point, kg; found by default.
         find_wrong_channels : bool
             Whether to look for a channel of the opposite sign, or two exchanged ones.
         accept : sequence of str
@@ -104,7 +115,7 @@ class MeasuredAssembly:
         coherence, averages = (None, None) if noise is not None else (self.coherence, self.averages)
         return identify_model(
             self.freq_hz, self.h, self.assembly, self.responses, self.forces, response_gains=self.response_gains,
-            force_gains=self.force_gains, fixed=self.fixed, noise=noise,
+            force_gains=self.force_gains, fixed=self.fixed, noise=noise, sensor_mass=sensor_mass,
             coherence=coherence, averages=averages, setups=self.setups,
             find_wrong_channels=find_wrong_channels, accept=accept,
         )  # fmt: skip
@@ -203,7 +214,7 @@ def measured_assembly(
     freq = frfs.freq_hz[kept]
     parts = file.parts(freq)
     file, located = file.located(parts)
-    rows, columns = (_dofs(file, parts, frfs, own) for own in (frfs.responses, frfs.excitations))
+    rows, columns = (_dofs(file, parts, frfs, side) for side in (0, 1))
     _check_named(file, frfs)
     for own, what in ((rows, "response"), (columns, "excitation")):
         if not own:
@@ -251,19 +262,15 @@ def _unused(frfs: FrfSet, named: tuple[dict[str, str], ...]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(str(one) for all_, own in pairs for one in all_ if str(one) not in own.values()))
 
 
-def _dofs(
-    file: AssemblyFile, parts: Mapping[str, AssemblyPart], frfs: FrfSet, channels: tuple[Channel, ...]
-) -> dict[str, tuple[int, int]]:
-    """Return for each DOF the number of its channel and its sign, in the order of the file of FRFs."""
+def _dofs(file: AssemblyFile, parts: Mapping[str, AssemblyPart], frfs: FrfSet, side: int) -> dict[str, tuple[int, int]]:
+    """Return for each DOF the number of its channel and its sign, in the order of the file of FRFs.
+
+    Responses are side 0, forces are side 1.
+    """
     given = file.keys.channels
+    channels = (frfs.responses, frfs.excitations)[side]
     found: dict[str, tuple[int, int]] = {}
-    if given:
-        check_dofs(parts, file.keys, "channels", list(given.values()))
-        table = file.keys.table.table("channels")
-        mapping = {}
-        for name, dof in given.items():
-            channel = table.build(lambda name=name: Channel.parse(name))  # type: ignore[misc]
-            mapping[channel], mapping[channel.opposite()] = (dof, 1), (dof, -1)
+    mapping = _stated(file, parts, side) if given else {}
     for i, channel in enumerate(channels):
         dof, sign = mapping.get(channel, ("", 1)) if given else _named_alike(parts, file, channel)
         if dof and dof in found:
@@ -272,6 +279,28 @@ def _dofs(
         if dof:
             found[dof] = (i, sign)
     return found
+
+
+def _stated(file: AssemblyFile, parts: Mapping[str, AssemblyPart], side: int) -> dict[Channel, tuple[str, int]]:
+    """Return DOF and sign of the channels under [channels], and of the opposite ones."""
+    table = file.keys.table.table("channels")
+    mapping: dict[Channel, tuple[str, int]] = {}
+    seen: dict[Channel, str] = {}
+    for name, dofs in file.keys.channels.items():
+        channel = table.build(lambda name=name: Channel.parse(name))  # type: ignore[misc]
+        if channel in seen:
+            raise table.wrong(
+                name,
+                f"{seen[channel]} names this direction, too; name it once, as "
+                f'"{name}" = {{ response = "A/1:-z", force = "A/1:z" }} if sensor and force differ in sign',
+            )
+        seen |= {channel: name, channel.opposite(): name}
+        own = dofs if isinstance(dofs, str) else dofs.dofs[side]
+        if own is not None:
+            dof, sign = without_sign(own)
+            check_dofs(parts, file.keys, "channels", [dof])
+            mapping[channel], mapping[channel.opposite()] = (dof, sign), (dof, -sign)
+    return mapping
 
 
 def _named_alike(parts: Mapping[str, AssemblyPart], file: AssemblyFile, channel: Channel) -> tuple[str, int]:

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from jointfrf.assembly_file.keys import (
     AlikeKeys,
     AssemblyKeys,
+    ChannelDofs,
     MatricesPart,
     ModesPart,
     PartKeys,
@@ -25,6 +26,7 @@ from jointfrf.assembly_file.keys import (
     PriorKeys,
     ReceptancesPart,
     Unknowns,
+    without_sign,
 )
 from jointfrf.assembly_file.modes import ModalStructure, ModesKeys
 from jointfrf.cases.substructures import SUBSTRUCTURES, MeasuredStructure, ModelStructure, Structure
@@ -71,7 +73,7 @@ __all__ = [
 #: 0.3 m; a spring to the ground is known by its order of magnitude.
 _USUAL = {
     "youngs_modulus": 0.03, "density": 0.01, "poisson": 0.03, "loss_factor": 0.5, "height": 0.01, "width": 0.01,
-    "length": 0.003, "length_scale": 0.003, "stiffness": 0.5, "damping": 1.0,
+    "thickness": 0.01, "length": 0.003, "length_scale": 0.003, "stiffness": 0.5, "damping": 1.0,
 }  # fmt: skip
 #: What words mean.
 _MEANT = {"E": "youngs_modulus", "rho": "density", "eta": "loss_factor", "thickness": "height", "nu": "poisson"}
@@ -131,6 +133,11 @@ class AssemblyPart:
             return self.structure.frfs.has(channel, channel)
         except ValueError:
             return False
+
+    def has_region(self, dof: str) -> bool:
+        """Whether this is the motion of a region, on which a joint acts per length or area."""
+        model = self.structure.model if isinstance(self.structure, ModelStructure) else None
+        return isinstance(model, PointModel) and bool(model.region_ports(dof))
 
     def similar(self, dof: str) -> str:
         """Return the end of a sentence that proposes a DOF of the part."""
@@ -205,7 +212,9 @@ class AssemblyPart:
         meant = dict(_MEANT)
         if "length" in takes:
             meant["length_scale"] = "length"
-        if "height" not in takes:
+        if "thickness" in takes:
+            del meant["thickness"]
+        elif "height" not in takes:
             if "thickness" in keys.unknown:
                 text = "K and M contain no thickness; name E, to which bending is proportional"
                 raise keys.wrong("unknown", text)
@@ -441,10 +450,19 @@ class AssemblyFile:
             said[f"{at} is {name}/{node}, {1e3 * (found.away or 0.0):.3g} mm away"] = None
             return f"{name}/{found.dof}"
 
+        def placed(dofs: str | ChannelDofs) -> str | ChannelDofs:
+            if isinstance(dofs, ChannelDofs):
+                one, other = (None if dof is None else placed(dof) for dof in dofs.dofs)
+                both: ChannelDofs = _changed(dofs, response=one, force=other)
+                return both
+            dof, sign = without_sign(dofs)
+            found = named(own, "channels", dof)
+            return found if sign > 0 else ":-".join(found.rsplit(":", 1))
+
         own = self.keys
         changed = _changed(
             own,
-            channels={name: named(own, "channels", dof) for name, dof in own.channels.items()},
+            channels={name: placed(dofs) for name, dofs in own.channels.items()},
             mass=tuple(_changed(one, dofs=tuple(named(one, "dofs", dof) for dof in one.dofs)) for one in own.mass),
             ground=tuple(_changed(one, dof=named(one, "dof", one.dof)) for one in own.ground),
             response_gains={named(own, "response_gains", dof): prior for dof, prior in own.response_gains.items()},
@@ -456,7 +474,7 @@ class AssemblyFile:
             for old, new in zip(self.part_keys[name].joint, part.keys.joint, strict=True)
         }
         joints = {
-            name: PlacedJoint(one.joint, tuple(node[dof] for dof in one.j), tuple(node[dof] for dof in one.k))
+            name: replace(one, j=tuple(node[dof] for dof in one.j), k=tuple(node[dof] for dof in one.k))
             for name, one in self.joints.items()
         }
         keys = {name: part.keys for name, part in parts.items()}
@@ -498,7 +516,7 @@ class AssemblyFile:
         for name, part in parts.items():
             own = part.keys
             for dof in own.joint:
-                if not part.has(dof):
+                if not (part.has(dof) or (joint is None and part.has_region(dof))):
                     raise own.wrong("joint", f"{name} has no DOF {dof!r}{part.similar(dof)}")
             if joint is not None and len(own.joint) == len(joint.dofs):  # else it is said how many there must be
                 own.build(lambda own=own: check_joint_order("", own.joint, joint.dofs), "joint")  # type: ignore[misc]
@@ -568,7 +586,7 @@ def _placed(keys: PlacedJointKeys) -> PlacedJoint:
         joint = _joint_of_table(TomlTable({"law": table.content["law"]}, table.where, table.folder))
     else:
         joint = _joint_of(keys, "file")
-    return keys.build(lambda: PlacedJoint(joint, keys.j, keys.k))
+    return keys.build(lambda: PlacedJoint(joint, keys.j, keys.k, keys.weight))
 
 
 def _part_of(table: TomlTable, name: str, joints: Mapping[str, PlacedJoint]) -> PartKeys:

@@ -14,6 +14,7 @@ from jointfrf.cases.comparison import verdict_sentence
 from jointfrf.cases.keys import Case, CaseKeys, ExpectedKeys
 from jointfrf.cases.kind import CaseKind
 from jointfrf.cases.workers import Workers
+from jointfrf.choices import CASE_KINDS
 from jointfrf.files import OwnFolder, check_stated, clean_name
 from jointfrf.report.document import Document, Page, make_document
 from jointfrf.report.draw import Drawing, draw
@@ -62,12 +63,8 @@ class _Kinds(Mapping[str, CaseKind[Any, Any]]):
 
 #: Bytes of memory of a realisation of the noise, chunks and estimates included.
 _REALISATION = 1_000
-#: The kinds of cases, by the value of `kind` in `case.toml`; the first is that of a case that names none.
-KINDS: Mapping[str, CaseKind[Any, Any]] = _Kinds(
-    "known-joint",
-    "bolted-lap",
-    "modelled-joint",
-)
+#: The kinds of cases, by the value of `kind` in `case.toml`.
+KINDS: Mapping[str, CaseKind[Any, Any]] = _Kinds(*CASE_KINDS)
 
 
 class UnknownCaseError(ValueError):

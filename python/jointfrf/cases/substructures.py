@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from msgspec import field
@@ -23,8 +23,10 @@ from jointfrf.io.units import ModelUnits, UnitSystemName, model_units
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.models.beam import BeamElement, End, beam
 from jointfrf.models.matrices import is_symmetric
-from jointfrf.models.model import Ground, chain
+from jointfrf.models.model import Ground, chain, with_modal_damping
+from jointfrf.models.plate import Edge, PlateRegion, plate
 from jointfrf.models.points import Coupling, PointModel, PointPatch, couple_points
+from jointfrf.models.regions import NodeRegion, add_regions
 from jointfrf.solids.brick_beam import Face, Hole, Preset, beam_divisions, brick_beam
 from jointfrf.toml.declared import Keys, NotNegative, Positive, key
 from jointfrf.toml.table import TomlTable
@@ -43,23 +45,16 @@ __all__ = [
 ]
 
 
-class PointPatchKeys(Keys):
-    """A reference point of a patch of nodes, named by `nodes`, `set` or `box`; six DOFs, `NAME:x` to `NAME:theta_z`."""
+class _NodesKeys(Keys):
+    """Nodes, named by `nodes`, `set` or `box`."""
 
-    name: Annotated[str, key("Name of the point.", example="joint", holds=lambda word: word != "" and ":" not in word)]
-    coupling: Annotated[
-        Coupling,
-        key("`rigid`: the nodes follow the point (RBE2, `*RIGID BODY`); `distributing`: the point shows their mean "
-            "motion and spreads forces over them (RBE3), which adds no stiffness."),
-    ] = "distributing"  # fmt: skip
+    name: Annotated[str, key("Name by which DOFs call it.", example="joint",
+                             holds=lambda word: word != "" and ":" not in word)]  # fmt: skip
     nodes: Annotated[tuple[int, ...], key("Nodes of the patch.", takes="list of numbers of nodes")] = ()
     set: Annotated[str, key("A set of nodes in the file of `nodes` of the part (`*NSET`).", absent="none")] = ""
     box: Annotated[
         tuple[float, float, float, float, float, float] | None,
         key("All nodes in a box: smallest x, y, z, largest x, y, z.", "m"),
-    ] = None
-    at: Annotated[
-        tuple[float, float, float] | None, key("Where the point is.", "m", absent="the mean place of the nodes")
     ] = None
 
     def chosen(self, file: NodeFile, places: Mapping[str, FloatArray]) -> tuple[str, ...]:
@@ -80,6 +75,62 @@ class PointPatchKeys(Keys):
         if not found:
             raise self.wrong("box", "no node lies in it")
         return found
+
+
+class PointPatchKeys(_NodesKeys):
+    """A reference point of a patch of nodes, named by `nodes`, `set` or `box`; six DOFs, `NAME:x` to `NAME:theta_z`."""
+
+    coupling: Annotated[
+        Coupling,
+        key("`rigid`: the nodes follow the point (RBE2, `*RIGID BODY`); `distributing`: the point shows their mean "
+            "motion and spreads forces over them (RBE3), which adds no stiffness."),
+    ] = "distributing"  # fmt: skip
+    at: Annotated[
+        tuple[float, float, float] | None, key("Where the point is.", "m", absent="the mean place of the nodes")
+    ] = None
+
+
+_Degree = Annotated[
+    int | tuple[int, int] | None,
+    key("Polynomials that describe the motion: total degree, or the degrees along both directions of a face.",
+        takes="whole number from 0, or list of two", absent="6 of a line, 4 of a face"),
+]  # fmt: skip
+
+
+class NodeRegionKeys(_NodesKeys):
+    """Nodes on a straight line or in a plane, where a joint acts per length or area: its end is `NAME:z`."""
+
+    degree: _Degree = None
+    size: Annotated[
+        Positive | None,
+        key("Length or area.", "m, m^2", absent="between the nodes; of a face their convex hull, holes included"),
+    ] = None
+
+
+class PlateRegionKeys(Keys):
+    """An edge, a line or a rectangle of a plate, where a joint acts per length or area: its end is `NAME:z`."""
+
+    name: Annotated[str, key("Name by which DOFs call it.", example="clamp")]
+    edge: Annotated[
+        Literal["x-", "x+", "y-", "y+"] | None, key("The edge of smallest or largest x or y.", absent="`box`")
+    ] = None
+    box: Annotated[
+        tuple[float, float, float, float] | None,
+        key("Smallest x, y, largest x, y, in global coordinates; equal ones make a line.", "m", absent="`edge`"),
+    ] = None
+    degree: _Degree = None
+
+    def region(self, low: FloatArray, high: FloatArray) -> PlateRegion:
+        """Return the region of a plate between two corners; raises FileContentError."""
+        if (self.edge is None) == (self.box is None):
+            raise self.missing(["edge or box"], "exactly one of them names the region")
+        corners = np.array([low, high])
+        if self.box is not None:
+            corners = np.reshape(self.box, (2, 2))
+        elif self.edge is not None:
+            corners[:, "xy".index(self.edge[0])] = (low, high)[self.edge[1] == "+"]["xy".index(self.edge[0])]
+        first, second = (tuple(corner) for corner in corners.tolist())
+        return PlateRegion(first, second, self.degree)
 
 
 class MatricesKeys(SubstructureKeys, tag="matrices"):
@@ -114,6 +165,7 @@ class MatricesKeys(SubstructureKeys, tag="matrices"):
             absent="SI of Matrix Market and NPZ; required by files of FE programs, which do not say them"),
     ] = None  # fmt: skip
     point: Annotated[tuple[PointPatchKeys, ...], key("Reference points of patches of nodes.")] = ()
+    region: Annotated[tuple[NodeRegionKeys, ...], key("Lines and faces on which joints act per length or area.")] = ()
 
     def structure(self, freq_hz: FloatArray) -> Structure:
         """Return the structure."""
@@ -138,12 +190,16 @@ class MatricesKeys(SubstructureKeys, tag="matrices"):
             found["stiffness"], found["mass"], file.named(dofs), found.get("damping"),
             found.get("structural_damping"), self.loss_factor, places=_places(dofs, file, units),
         )  # fmt: skip
+        nodes = dict(model.places)
         patches = [
             PointPatch(one.name, one.chosen(file, model.places), one.coupling, np.array(one.at) if one.at else None)
             for one in self.point
         ]
         if patches:
             model = self.build(lambda: couple_points(model, patches), "point")
+        regions = [NodeRegion(one.name, one.chosen(file, nodes), one.degree, one.size) for one in self.region]
+        if regions:
+            model = self.build(lambda: add_regions(model, regions), "region")
         about = _about(paths, stored, units, held, len(file.turned))
         return ModelStructure(model, about=about, patches=tuple(patches))
 
@@ -265,8 +321,8 @@ def _unsymmetric(path: Path, matrix: sparse.csr_array) -> str:
     return text + ("; it contains one triangle only" if is_triangle else "")
 
 
-#: Bytes of memory of a beam element and of a brick, names of DOFs and assembly included.
-BEAM_ELEMENT, BRICK = 2_000, 25_000
+#: Bytes of memory of an element of a beam, of a brick and of an element of a plate, names and assembly included.
+BEAM_ELEMENT, BRICK, PLATE_ELEMENT = 2_000, 25_000, 200_000
 #: A key of all models of bricks.
 PRESET = key("Elements: `seed` as in the thesis (C3D8R), `accurate` with incompatible modes (C3D8I).", example="seed")
 
@@ -318,6 +374,63 @@ class BeamKeys(SubstructureKeys, tag="beam"):
             poisson=(self.poisson or 0.0) if is_flexible else 0.0, loss_factor=self.loss_factor,
         ))  # fmt: skip
         return ModelStructure(model, np.linspace(0, self.length, self.elements + 1))
+
+
+class PlateKeys(SubstructureKeys, tag="plate"):
+    """A rectangular plate in the plane of x and y, bending in z with shear; DOFs `"1:z"`, `"1:theta_x"`, `"1:theta_y"`.
+
+    Nodes count along x, then y; elements of the fourth degree have 5 x 5 of them.
+    """
+
+    length: Annotated[Positive, key("Length along x.", "m", example=0.3)]
+    width: Annotated[Positive, key("Width along y.", "m", example=0.2)]
+    thickness: Annotated[Positive, key("Thickness.", "m", example=0.005)]
+    youngs_modulus: Annotated[Positive, key("Young's modulus.", "N/m^2", example=70e9)]
+    density: Annotated[Positive, key("Density.", "kg/m^3", example=2700.0)]
+    poisson: Annotated[float, key("Poisson's ratio.", example=0.3)]
+    elements: Annotated[
+        tuple[int | tuple[float, ...], int | tuple[float, ...]],
+        key("Equal elements along x and y, or the lines between them from 0 to the length or the width, m.",
+            takes="list of 2 whole numbers, or lists of numbers", example=[4, 3]),
+    ] = (4, 4)  # fmt: skip
+    edges: Annotated[
+        tuple[Edge, Edge, Edge, Edge],
+        key("How the edges are held: smallest and largest x, smallest and largest y. `supported`: no deflection, no "
+            "rotation along the edge."),
+    ] = ("free", "free", "free", "free")  # fmt: skip
+    origin: Annotated[tuple[float, float, float], key("Corner of the smallest x and y.", "m")] = (0.0, 0.0, 0.0)
+    points: Annotated[
+        dict[str, tuple[float, float]],
+        key('Places x, y between nodes, by names: `{ p1 = [0.1, 0.05] }` gives `"p1:z"`.', "m",
+            takes="table of lists of 2 numbers"),
+    ] = field(default_factory=dict)  # fmt: skip
+    region: Annotated[tuple[PlateRegionKeys, ...], key("Lines and faces on which joints act per length or area.")] = ()
+    loss_factor: Annotated[
+        NotNegative, key("Loss factor eta of the stiffness, K (1 + i eta): twice the damping ratio of each mode.")
+    ] = 0.0
+    modal_damping: Annotated[
+        tuple[NotNegative, ...],
+        key("Viscous damping ratios of its elastic modes alone, the lowest first, beside the loss factor.",
+            takes="list of numbers, at least 0"),
+    ] = ()  # fmt: skip
+
+    def structure(self, freq_hz: FloatArray) -> Structure:
+        """Return the structure."""
+        count = [one if isinstance(one, int) else len(one) for one in self.elements]
+        self.table.check_stated("elements", PLATE_ELEMENT * count[0] * count[1])
+        low = np.array(self.origin[:2])
+        high = low + np.array([self.length, self.width])
+        regions = {one.name: one.region(low, high) for one in self.region}
+        if len(regions) < len(self.region):
+            raise self.wrong("region", "two regions have one name; name each once")
+        model = self.build(lambda: plate(
+            self.length, self.width, self.thickness, youngs_modulus=self.youngs_modulus, density=self.density,
+            poisson=self.poisson, elements=self.elements, edges=self.edges, origin=self.origin, points=self.points,
+            regions=regions, loss_factor=self.loss_factor,
+        ))  # fmt: skip
+        if self.modal_damping:
+            model = self.build(lambda: with_modal_damping(model, self.modal_damping), "modal_damping")
+        return ModelStructure(model)
 
 
 class HoleKeys(Keys):
@@ -397,4 +510,4 @@ class ReceptancesKeys(SubstructureKeys, tag="receptances"):
 
 
 #: The kinds of substructures, which `model` distinguishes.
-SUBSTRUCTURES = (ChainKeys, BeamKeys, BrickBeamKeys, MatricesKeys, ReceptancesKeys)
+SUBSTRUCTURES = (ChainKeys, BeamKeys, PlateKeys, BrickBeamKeys, MatricesKeys, ReceptancesKeys)

@@ -681,4 +681,5 @@ def node_dofs(node_j: int, node_k: int, dofs: Sequence[str], coordinates: Mappin
     motion = np.zeros((2 * n, 12))
     motion[np.arange(n), places] = 1
     motion[n + np.arange(n), 6 + places] = 1
-    return Interface(channels, np.eye(2 * n), (ends[0], ends[1]), direction_names(dofs), motion)
+    placed = len(given) == 2
+    return Interface(channels, np.eye(2 * n), (ends[0], ends[1]), direction_names(dofs), motion, placed=placed)

@@ -259,6 +259,8 @@ class Interface(NamedTuple):
     compliance : ndarray, shape (n,), or None
         What the bending of the sides between the points is expected to add to the compliance of each joint DOF, m/N or
         rad/(N m), where that is known.
+    placed : bool
+        Whether the positions of the points are known.
     """
 
     channels: tuple[Channel, ...]
@@ -267,12 +269,24 @@ class Interface(NamedTuple):
     dofs: tuple[str, ...]
     motion: FloatArray
     compliance: FloatArray | None = None
+    placed: bool = True
 
     @property
     def modes(self) -> FloatArray:
         """Motion of each channel for a unit of each joint DOF, j then k, shape (m, 2 n)."""
         at = direction_places(self.dofs)
         return self.motion[:, np.concatenate([at, at + len(DIRECTIONS)])]
+
+    @property
+    def mode_slopes(self) -> FloatArray:
+        """Derivatives of `modes` by x, y and z of the position of a channel, shape (3, m, 2 n), 1/m and 1/rad."""
+        at, half = direction_places(self.dofs), len(DIRECTIONS)
+        slopes = np.zeros((3, *self.motion.shape))
+        for axis, unit in enumerate(np.eye(3)):
+            for first in (0, half):
+                # The displacement theta x r of a point along e changes by e . (theta x dr) = theta . (dr x e).
+                slopes[axis, :, first + 3 : first + half] = np.cross(unit, self.motion[:, first : first + 3])
+        return slopes[:, :, np.concatenate([at, at + half])]
 
 
 def interface(

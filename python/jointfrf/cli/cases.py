@@ -5,17 +5,9 @@ from __future__ import annotations
 import argparse
 
 from jointfrf.cases.catalogue import case_title, key_page, list_cases
-from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import Output
 
-__all__ = ["add_arguments", "run"]
-
-
-def add_arguments(parser: CommandParser) -> None:
-    """Describe the arguments of the command."""
-    parser.description = "List the cases that come with jointfrf."
-    parser.examples.append("jointfrf cases")
-    parser.option("--keys", "print all keys of case.toml and expected.toml (Markdown) instead")
+__all__ = ["run"]
 
 
 def run(options: argparse.Namespace) -> int:

@@ -6,34 +6,17 @@ import argparse
 
 from jointfrf.channels.check.check import check_frfs, wrong_numbers
 from jointfrf.channels.check.result import FrfCheck
-from jointfrf.cli.masses import add_mass_arguments, check_masses, check_stated, scale_of_joint
-from jointfrf.cli.measured_file import add_file_arguments, file_names, in_some_band, read_measured
+from jointfrf.cli.masses import check_masses, check_stated, scale_of_joint
+from jointfrf.cli.measured_file import file_names, in_some_band, read_measured
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
-from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import Output, waiting
 from jointfrf.io import FrfSet
 
-__all__ = ["add_arguments", "check_joint", "run"]
+__all__ = ["check_joint", "run"]
 
 
 #: Options that say which joint is in the file.
 _OF_JOINT = ("j", "k", "dofs", "at", "at_k", "channels", "spacing", "axis")
-
-
-def add_arguments(parser: CommandParser) -> None:
-    """Describe the arguments of the command."""
-    parser.description = (
-        "Check measured FRFs: content of the file; quantity, time convention, sign, gain, delay and units of each "
-        "channel; dead, doubled and exchanged channels; reciprocity, passivity, bad lines, missing FRFs. --j, --k and "
-        "--dofs select the channels of the joint; --at adds a comparison of each channel with the rigid motion of its "
-        "side. Exit status 0: no errors or warnings; 1: some."
-    )
-    parser.examples += [
-        "jointfrf check cases/hammer-test/two_bars.uff",
-        "jointfrf check cases/bending-sides/test.uff --at 0,0,0 --j 101:104 --k 201:204 --dofs y,rz",
-    ]
-    add_file_arguments(parser)
-    add_mass_arguments(parser)
 
 
 def check_joint(joint: MeasuredJoint, measured: FrfSet) -> FrfCheck:

@@ -22,7 +22,7 @@ _NO_DEFAULTS = ("--help", "-h", "--config", "--no-config")
 #: Keys of a table of channels, which may be in the same file; without channels `unit` is the one of the FRFs.
 _CHANNELS = ("unit", "channel")
 #: What a file that was found, not named, may set beside which joint is in the FRFs: it may be a stranger's.
-_OF_THE_FIT = ("--method", "--damping", "--cross", "--noise", "--bending-stiffness")
+_OF_THE_FIT = ("--method", "--damping", "--cross", "--noise", "--floor", "--bending-stiffness")
 
 
 def with_configuration(args: argparse.Namespace, parser: CommandParser, command: str) -> argparse.Namespace:
@@ -100,7 +100,7 @@ def _options(parser: CommandParser) -> dict[str, argparse.Action]:
 
 def _shared() -> dict[str, argparse.Action]:
     """Return the options that say which joint is in a file, which several commands have."""
-    from jointfrf.cli.measured_file import add_joint_arguments
+    from jointfrf.cli.arguments.measured_file import add_joint_arguments
 
     shared = CommandParser(add_help=False)
     add_joint_arguments(shared)

@@ -5,15 +5,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from jointfrf.channels.check.check import warn_of_sets
 from jointfrf.channels.virtual_point import append_virtual_point, channel_geometry, virtual_point
+from jointfrf.cli.arguments.measured_file import Nodes
 from jointfrf.cli.frf import (
     CHANNEL_DIRECTIONS,
-    add_line_arguments,
     check_target,
     is_model,
     lines_of,
@@ -21,49 +20,17 @@ from jointfrf.cli.frf import (
     own_matrix,
     read_structures,
 )
-from jointfrf.cli.measured_file import READING, Nodes, add_reading_arguments, nodes, point, reading_options
-from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.measured_file import READING, reading_options
 from jointfrf.cli.usage import Output, UsageError, waiting, warn_of_ignored
 from jointfrf.dofs import direction_places
 from jointfrf.errors import FileContentError
 from jointfrf.identification.joint_file import read_joint_file
 from jointfrf.io import Channel, FrfSet, write_frfs
-from jointfrf.io.formats import format_names
 from jointfrf.joint import Joint
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.substructuring.coupling import couple
 
-__all__ = ["add_arguments", "add_joint_arguments", "coupled", "joint_channels_of", "renumbered", "run", "shifted"]
-
-
-def add_arguments(parser: CommandParser) -> None:
-    """Describe the arguments of the command."""
-    parser.description = (
-        "Couple two substructures by a joint (2.26) and write the FRFs of the assembly. A substructure is a file of "
-        "FRFs or a TOML file of a model. The joint is a JSON file of identify --save, or a TOML file with dofs, "
-        "stiffness, damping, loss_factor, or with laws of its DOFs."
-    )
-    parser.requires("--joint", "--j", "--k", "--output")
-    parser.examples.append(
-        "jointfrf couple cases/two-beams/a.toml cases/two-beams/b.toml --joint cases/two-beams/joint.toml --j 11 --k 1 "
-        "--renumber-b 100 --band 20:800 --step 1 --output assembly.uff"
-    )
-    parser.add_argument("a", type=Path, metavar="A", help="substructure A: file of FRFs, or model (.toml)")
-    parser.add_argument("b", type=Path, metavar="B", help="substructure B")
-    add_joint_arguments(parser)
-    parser.option("--output FILE", f"file to write: {format_names(written=True)}", Path)
-    add_line_arguments(parser)
-    add_reading_arguments(parser)
-
-
-def add_joint_arguments(parser: CommandParser) -> None:
-    """Describe the joint, and where it is in its parts."""
-    parser.option("--joint FILE", "the joint: .json or .toml", Path)
-    parser.option("--j NODES", "node of A at the joint, with all joint DOFs; with --at, nodes around the joint", nodes)
-    parser.option("--k NODES", "node of B at the joint; with --at, nodes around it", nodes)
-    parser.option("--at X,Y,Z", "reference point of virtual points, m", point)
-    parser.option("--renumber-b N", "number added to the nodes of B, if A and B have equal numbers", int, 0)
-    parser.option("--shift-b X,Y,Z", "vector added to the coordinates of B, m", point, (0.0, 0.0, 0.0))
+__all__ = ["coupled", "joint_channels_of", "renumbered", "run", "shifted"]
 
 
 def renumbered(frfs: FrfSet, add: int, shift: Sequence[float] = (0.0, 0.0, 0.0)) -> FrfSet:

@@ -5,40 +5,32 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple, cast, get_args
+from typing import NamedTuple
 
 import numpy as np
 
-from jointfrf.cli.measured_file import nodes, numbers, point, words
-from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_folder, positive, warn_of_ignored
+from jointfrf.cli.arguments.export import CardNodes
+from jointfrf.cli.usage import Output, UsageError, check_folder, warn_of_ignored
 from jointfrf.dofs import point_and_direction
 from jointfrf.files import write_file
 from jointfrf.identification.fit_cards import cards
 from jointfrf.identification.joint_file import JointFile, read_joint_file
 from jointfrf.identification.result import Fit
-from jointfrf.io.cards import CardFormat, CardOptions
-from jointfrf.io.units import UnitSystemName, model_units
+from jointfrf.io.card_link import CardFormat
+from jointfrf.io.cards import CardOptions
+from jointfrf.io.units import model_units
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.laws.law_joint import LawJoint
-from jointfrf.spelling import did_you_mean
 
-__all__ = [
-    "CardRequest",
-    "add_arguments",
-    "add_card_arguments",
-    "card_request",
-    "page_nodes",
-    "parse_export",
-    "run",
-    "written_cards",
-]
+__all__ = ["CardRequest", "card_request", "page_nodes", "run", "written_cards"]
 
 
 #: Arguments of `export` in its messages, and the options that stand for them.
 _OPTIONS = (
     ("full_matrix", "--full-matrix"),
+    ("name the first of them by damping_nodes", "name the first of them by --damping-nodes N"),
+    ("damping_nodes", "--damping-nodes"),
     ("(bounds)", "(--bounds)"),
     ("state one frequency by freq_hz", "state one frequency by --frequency HZ"),
     ("name one frequency by freq_hz", "name one frequency by --frequency HZ"),
@@ -52,54 +44,9 @@ _OPTIONS = (
 _STRAIGHT, _MOST_HALVINGS = 1e-3, 9
 
 
-def add_arguments(parser: CommandParser) -> None:
-    """Describe the arguments of the command."""
-    parser.description = (
-        "Write a joint as input of a finite-element program: abaqus (springs and dashpots, or matrices), calculix "
-        "(springs), nastran (CBUSH, or DMIG) or ansys (MATRIX27), with the interval of each number as a comment."
-    )
-    parser.examples += [
-        "jointfrf export joint.json nastran:9001,9002 --output joint.bdf",
-        "jointfrf export joint.json calculix:9001,9002,9003,9004 --nodes-at 0.05,0,0,0.07,0,0 --output joint.inp",
-    ]
-    parser.add_argument(
-        "joint", type=Path, metavar="JOINT", help="JSON file of identify --save, or a TOML file of constants or laws"
-    )
-    parser.add_argument(
-        "export",
-        type=parse_export,
-        metavar="PROGRAM:J,K",
-        help="program and nodes j and k of its model: nastran:9001,9002; rotations of calculix need two ROT NODEs "
-        "after them; several joints: nastran:fl=9001,9002:fr=9003,9004",
-    )
-    parser.option(
-        "--frequency HZ",
-        "frequency at which frequency-dependent laws are evaluated; LOW:HIGH writes tables over frequency (abaqus, "
-        "nastran)",
-        _frequency,
-    )
-    parser.option("--point NAME", "joint point to write, from a fit of several joint points: bolt1")
-    parser.option(
-        "--joint-at X,Y,Z",
-        "reference point of the joint in the model, in its unit of length",
-        point,
-        otherwise="the saved reference point",
-    )
-    add_card_arguments(parser)
-
-
-def _frequency(text: str) -> float | tuple[float, float]:
-    low, colon, high = text.partition(":")
-    (found,) = numbers(low, 1, ("frequency", "HZ or LOW:HIGH"))
-    last = numbers(high, 1, ("frequency", "LOW:HIGH in Hz"))[0] if colon else found
-    if not found > 0 or (colon and not found < last):
-        raise argparse.ArgumentTypeError(f"{text!r} is no band or frequency above 0 Hz; use HZ or LOW:HIGH")
-    return (float(found), float(last)) if colon else float(found)
-
-
 def _table_lines(joint: Joint | LawJoint, low: float, high: float) -> FloatArray:
     """Return lines between which Re K* and Im K*/w are nearly straight, Hz: as many as that takes."""
-    springs = joint if isinstance(joint, Joint) else LawJoint(joint.laws)
+    springs = joint if isinstance(joint, Joint) else LawJoint(joint.laws, per=joint.per)
     for power in range(_MOST_HALVINGS + 1):
         freq = np.geomspace(low, high, 2**power + 1)
         between = (freq[1:] + freq[:-1]) / 2
@@ -194,7 +141,7 @@ def _springs(joint: Joint | LawJoint, freq_hz: float | None) -> Joint | None:
     if isinstance(joint, Joint):
         return joint
     try:
-        return LawJoint(joint.laws).constant_joint(freq_hz) if joint.laws else None
+        return LawJoint(joint.laws, per=joint.per).constant_joint(freq_hz) if joint.laws else None
     except ValueError as error:
         raise UsageError(_refusal(str(error), "")) from error
 
@@ -213,10 +160,6 @@ def _points(args: argparse.Namespace, found: JointFile) -> FloatArray | None:
     if args.joint_at is not None:
         return np.tile(args.joint_at, (2, 1)) * model_units(args.units).length
     return found.points
-
-
-#: Nodes j and k of a joint, and ROT NODEs of CalculiX; of several joints by their names.
-CardNodes = list[int] | dict[str, list[int]]
 
 
 class CardRequest(NamedTuple):
@@ -241,83 +184,9 @@ class CardRequest(NamedTuple):
     output: Path | None
 
 
-def parse_export(text: str) -> tuple[CardFormat, CardNodes]:
-    """Return program and nodes of words like abaqus:9001,9002, or abaqus:fl=9001,9002:fr=9003,9004."""
-    program, _, rest = text.partition(":")
-    known = get_args(CardFormat)
-    if program not in known:
-        raise argparse.ArgumentTypeError(
-            f"unknown program {program!r}; use one of {', '.join(known)}{did_you_mean(program, known)}"
-        )
-    if "=" not in rest:
-        return cast(CardFormat, program), _ends(text, program, rest)
-    of_joints: dict[str, list[int]] = {}
-    for part in rest.split(":"):
-        name, _, own = part.partition("=")
-        if not name or name in of_joints:
-            raise argparse.ArgumentTypeError(
-                f"{text!r} names {name or 'no joint'} {'twice' if name else f'for {own}'}; name each joint once"
-            )
-        of_joints[name] = _ends(text, program, own)
-    return cast(CardFormat, program), of_joints
-
-
-def _ends(text: str, program: str, rest: str) -> list[int]:
-    """Return the nodes of one joint."""
-    ends = list(nodes(rest).numbers) if rest else []
-    if 0 < len(ends) < len(words(rest)):
-        raise argparse.ArgumentTypeError(f"{text!r} names a node twice; give different nodes")
-    if len(ends) not in (2, 4 if program == "calculix" else 2):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is no program with nodes j and k; use abaqus:9001,9002, for several joints "
-            "abaqus:fl=9001,9002:fr=9003,9004, with two more ROT NODEs for calculix"
-        )
-    return ends
-
-
 def page_nodes(args: argparse.Namespace) -> Sequence[int]:
     """Return the nodes in the cards that a page shows: those of one joint, where they are named."""
     return (1, 2) if args.export is None or isinstance(args.export[1], dict) else args.export[1]
-
-
-def _faces(text: str) -> tuple[list[int], list[int]]:
-    one, colon, other = text.partition(":")
-    if not colon:
-        raise argparse.ArgumentTypeError(f"{text!r} is not two lists of nodes; use the form 11,12,13:21,22,23")
-    return list(nodes(one).numbers), list(nodes(other).numbers)
-
-
-def _positions(text: str) -> tuple[tuple[float, ...], ...]:
-    found = numbers(text, 6, ("pair of points", "xj,yj,zj,xk,yk,zk"))
-    return found[:3], found[3:]
-
-
-def add_card_arguments(parser: CommandParser) -> None:
-    """Describe what belongs to the cards of any program."""
-    parser.option("--output FILE", "file for the cards: joint.bdf", Path)
-    parser.option(
-        "--nodes-at XJ,YJ,ZJ,XK,YK,ZK",
-        "positions of the two nodes of the model, in its unit of length; rigid arms connect them to the reference "
-        "point of the joint",
-        _positions,
-        otherwise="the reference point",
-    )
-    parser.option("--units", "units of the model", get_args(UnitSystemName), "SI")
-    parser.option(
-        "--faces J1,J2,...:K1,K2,...",
-        "nodes of solid elements that follow the two nodes as rigid bodies",
-        _faces,
-        otherwise="with --model the nodes of rigid reference points, else a comment to fill in",
-    )
-    parser.option("--element N", "first number of new elements", positive, 1)
-    parser.option("--property N", "first number of new properties", positive, 1)
-    parser.option("--full-matrix", "write matrices even if springs suffice (abaqus, nastran)")
-    parser.option(
-        "--connector", "write a connector element, for direct steady-state steps, instead of matrices (abaqus)"
-    )
-    parser.option("--all-damping", "include dashpots that are negative or not significantly above zero")
-    parser.option("--bounds", "include stiffnesses with an unbounded interval, by their best estimates")
-    parser.option("--no-damping", "leave out all damping")
 
 
 def card_request(
@@ -344,7 +213,8 @@ def card_request(
         for name in ("--output", "--nodes-at", "--units", "--faces"):
             if name.removeprefix("--").replace("-", "_") in args.given:
                 raise UsageError(f"{name} is for cards; add --export PROGRAM:J,K")
-        flags = ("--element", "--property", "--full-matrix", "--connector", "--all-damping", "--bounds", "--no-damping")
+        flags = ("--element", "--property", "--full-matrix", "--connector", "--all-damping", "--bounds", "--no-damping",
+                 "--damping-nodes")  # fmt: skip
         warn_of_ignored(args, flags, "no cards are written without --export PROGRAM:J,K")
         return None
     check_folder("--output", args.output)
@@ -355,7 +225,8 @@ def card_request(
         "element": args.element,
         "number": args.property,
         "rotation_nodes": None if of_joints else ends[2:] or None,
-        "damping": not args.no_damping and program != "calculix",  # it has none between DOFs; the text says so
+        "damping": not args.no_damping and (program != "calculix" or args.damping_nodes is not None),
+        "damping_nodes": args.damping_nodes,
         "full_matrix": args.full_matrix,
         "connector": args.connector,
         "units": args.units,

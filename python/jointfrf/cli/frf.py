@@ -16,22 +16,20 @@ from jointfrf.assembly_file.modes import ModalStructure
 from jointfrf.assembly_file.read import read_structure
 from jointfrf.cases.keys import MOST_LINES
 from jointfrf.cases.substructures import ModelStructure
-from jointfrf.cli.measured_file import READING, add_reading_arguments, parse_band, reading_options, words
-from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.arguments.frf import MATRICES, MOST_DOFS
+from jointfrf.cli.measured_file import READING, reading_options
 from jointfrf.cli.usage import OptionWarning, Output, UsageError, listed, waiting, warn_of_ignored
 from jointfrf.dofs import DIRECTIONS, direction_places
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.extras import check_extras
 from jointfrf.frf.merge import same_lines
 from jointfrf.io import Channel, FrfSet, read_frfs, write_frfs
-from jointfrf.io.formats import check_suffix, format_names, read_frf_sets
+from jointfrf.io.formats import check_suffix, read_frf_sets
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.toml.table import TomlTable, read_toml
 
 __all__ = [
     "CHANNEL_DIRECTIONS",
-    "add_arguments",
-    "add_line_arguments",
     "check_target",
     "frfs_of_model",
     "is_model",
@@ -41,39 +39,6 @@ __all__ = [
     "read_structures",
     "run",
 ]
-
-#: Options that name files of matrices.
-_MATRICES = ("stiffness", "mass", "damping", "structural_damping")
-#: FRFs between more DOFs are hardly meant.
-_MOST_DOFS = 240
-
-
-def add_arguments(parser: CommandParser) -> None:
-    """Describe the arguments of the command."""
-    parser.description = (
-        f"Compute receptances of a model and write them as {format_names(written=True)}. The model is a TOML file with "
-        "the keys of a substructure of a case (chain, beam, brick-beam, matrices, modes) or of a part of an assembly, "
-        "or matrices named by options."
-    )
-    parser.requires("MODEL", "--output", "--band", "--step")
-    parser.requires("MODEL", "--output", "--lines-of")
-    parser.requires("--stiffness", "--mass", "--dof-names", "--output", "--band", "--step")
-    parser.examples.append("jointfrf frf cases/two-beams/a.toml --band 20:800 --step 1 --output a.uff")
-    parser.add_argument(
-        "model", nargs="?", type=Path, metavar="MODEL", help="TOML file of a model; or --stiffness, --mass, --dof-names"
-    )
-    parser.option("--output FILE", f"file to write: {format_names(written=True)}", Path)
-    add_line_arguments(parser)
-    parser.option("--lines-of FILE", "file of FRFs whose frequency lines are used, instead of --band and --step", Path)
-    parser.option("--points DOFS", "DOFs of the model: 3:y,3:theta", words, otherwise=f"all, up to {_MOST_DOFS}")
-    parser.heading("a model by its matrices (Matrix Market or NPZ)")
-    names = ("stiffness K, N/m", "mass M, kg", "viscous damping C, N s/m", "structural damping H, N/m")
-    for name, what in zip(_MATRICES, names, strict=True):
-        parser.option(f"--{name.replace('_', '-')} FILE", f"file of the {what}")
-    parser.option("--loss-factor ETA", "loss factor of the stiffness", float, 0.0)
-    parser.option("--dof-names FILE", "text file, one DOF a line: 12:y, or 12 2")
-    parser.heading("the file of --lines-of")
-    add_reading_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -118,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _table(args: argparse.Namespace) -> TomlTable:
     """Return the table of the model: that of the file, or one of the options."""
-    given: dict[str, Any] = {name: getattr(args, name) for name in _MATRICES if getattr(args, name) is not None}
+    given: dict[str, Any] = {name: getattr(args, name) for name in MATRICES if getattr(args, name) is not None}
     if "loss_factor" in args.given:
         given["loss_factor"] = args.loss_factor
     if args.dof_names is not None:
@@ -161,12 +126,6 @@ def check_target(target: Path) -> None:
         raise UsageError(f"{target} is a folder; name a file")
     if needed:
         check_extras(needed)
-
-
-def add_line_arguments(parser: CommandParser) -> None:
-    """Describe the frequency lines of models."""
-    parser.option("--band LOW:HIGH", "first and last frequency, Hz", parse_band)
-    parser.option("--step HZ", "spacing of the frequency lines of models, Hz; needs --band", float)
 
 
 def lines_of(args: argparse.Namespace) -> FloatArray | None:
@@ -221,7 +180,7 @@ def frfs_of_model(
     """
     known = structure.modes.dofs if isinstance(structure, ModalStructure) else structure.model.dofs
     dofs = list(known) if points is None else list(points)
-    if points is None and len(dofs) > _MOST_DOFS:
+    if points is None and len(dofs) > MOST_DOFS:
         raise UsageError(f"{source} has {len(dofs)} DOFs; select some by --points, such as {dofs[0]},{dofs[-1]}")
     channels, named = _channels(dofs)
     h = structure.receptance(freq_hz, dofs)

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -15,22 +15,15 @@ from jointfrf.assembly_file.side_part import SidePart, read_side
 from jointfrf.channels.check.check import stop_at_errors
 from jointfrf.channels.check.result import FrfCheck
 from jointfrf.channels.point_lines import difference_error
+from jointfrf.cli.arguments.measured_file import shown_nodes
 from jointfrf.cli.check import check_joint
-from jointfrf.cli.export import CardRequest, add_card_arguments, card_request, page_nodes, parse_export, written_cards
-from jointfrf.cli.identify_model import add_model_arguments, run_model
-from jointfrf.cli.joint_laws import add_law_arguments, joint_of_laws
-from jointfrf.cli.masses import add_mass_arguments, check_masses, check_stated, scale_of_fit
-from jointfrf.cli.measured_file import (
-    add_file_arguments,
-    file_names,
-    in_some_band,
-    read_measured,
-    setups_with_gains,
-    shown_nodes,
-    words,
-)
+from jointfrf.cli.export import CardRequest, card_request, page_nodes, written_cards
+from jointfrf.cli.identify_model import run_model
+from jointfrf.cli.joint_laws import joint_of_laws
+from jointfrf.cli.masses import check_masses, check_stated, scale_of_fit
+from jointfrf.cli.measured_file import file_names, in_some_band, read_measured, setups_with_gains
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
-from jointfrf.cli.parser import CommandParser, one_of
+from jointfrf.cli.noise import stated_noise
 from jointfrf.cli.usage import Interrupt, Output, UsageError, check_folder, check_out, plain, waiting, warn_of_ignored
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
@@ -38,123 +31,14 @@ from jointfrf.extras import check_extras
 from jointfrf.frf.noise_model import estimate_noise
 from jointfrf.identification.band_means import identify_band_mean
 from jointfrf.identification.identify import identify
-from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
 from jointfrf.identification.record import fit_to_dict, write_record
 from jointfrf.identification.result import Fit
 from jointfrf.identification.side_models import SideModel
 from jointfrf.io import FrfSet
 from jointfrf.laws.law_joint import LawJoint
-from jointfrf.messages.of_data import FATAL_CODES
 from jointfrf.report.fit_page import write_report
-from jointfrf.spelling import did_you_mean
 
-__all__ = ["add_arguments", "run"]
-
-#: Methods that need no model.
-_METHODS = ("compliance", "inverse-substructuring")
-
-
-def _methods(text: str) -> list[str]:
-    found = words(text)
-    for word in found or [text]:
-        if word not in _METHODS:
-            hint = did_you_mean(word, _METHODS)
-            raise argparse.ArgumentTypeError(f"unknown method {word!r}; use one of {', '.join(_METHODS)}{hint}")
-    return found
-
-
-def add_arguments(parser: CommandParser) -> None:
-    """Describe the arguments of the command."""
-    parser.description = (
-        "Identify a joint from the FRFs of an assembly. Accelerances and mobilities are converted to receptances. The "
-        "joint DOFs are found in one of three ways: virtual points of all channels around the joint (--at), points "
-        "along a line (rotations by central differences), or two nodes whose rotations are in the file. With models of "
-        "both parts (--model), any FRFs of the assembly suffice."
-    )
-    parser.requires("--j", "--k", "--dofs")
-    parser.requires("--at", "--channels", "--dofs")
-    parser.requires("--model")
-    parser.examples += [
-        "jointfrf identify cases/hammer-test/two_bars.uff --j 101,102 --k 201,202 --dofs y,rz --save joint.json",
-        "jointfrf identify cases/bending-sides/test.uff --at 0,0,0 --j 101:104 --k 201:204 --dofs y,rz "
-        "--side-j cases/bending-sides/side_j.toml --side-k cases/bending-sides/side_k.toml",
-        "jointfrf identify cases/lap-beam/level_1.uff --model cases/lap-beam/assembly.toml",
-    ]
-    add_file_arguments(parser)
-    add_model_arguments(parser)
-    parser.heading("the fit")
-    parser.option("--method METHODS", f"one or several methods of {','.join(_METHODS)}", _methods, ["compliance"])
-    parser.option(
-        "--damping",
-        "damping terms of K* = k (1 + i eta) + i w c; auto: the terms that the data support",
-        (*get_args(DampingTerms), "auto"),
-        "auto",
-    )
-    parser.option(
-        "--cross",
-        "terms between the joint DOFs; zero: none, ignore: not evaluated, points: fitted within each of --points, fit: "
-        "fitted",
-        get_args(CrossTerms),
-        "zero",
-    )
-    parser.option("--same NAMES", "equal joint points, which share their parameters: bolt1,bolt2", words, repeated=True)
-    parser.option(
-        "--side-j PART",
-        "part.toml, model of side j alone, free of the other side (keys of [A] of assembly.toml): corrects the FRFs "
-        "for the flexibility of the side between channels and joint; needs --side-k",
-        Path,
-    )
-    parser.option("--side-k PART", "part.toml, model of side k alone; needs --side-j", Path)
-    add_law_arguments(parser)
-    add_mass_arguments(parser)
-    parser.option(
-        "--noise LEVEL",
-        "relative noise of the FRFs; 0.01 means 1 %%",
-        float,
-        otherwise="estimated from the FRFs",
-    )
-    parser.option(
-        "--setup-gain LEVEL",
-        "relative standard deviation of the gain of one set-up (each file is one); 0.01 means 1 %%",
-        float,
-        otherwise="estimated from the differences between the set-ups",
-    )
-    parser.option(
-        "--common-gain LEVEL",
-        "relative standard deviation of a gain that all FRFs share, such as the calibration of the hammer",
-        float,
-    )
-    parser.option(
-        "--accept CODE",
-        "code of an error of the data at which the fit does not stop, such as quantity; may be repeated",
-        one_of(FATAL_CODES),
-        repeated=True,
-    )
-    parser.option(
-        "--window-decay SIGMA",
-        "decay rate of the exponential window exp(-SIGMA t) of the test, 1/s: accelerances are divided by s^2, "
-        "mobilities by s = i w + SIGMA, and SIGMA c is subtracted from stiffnesses",
-        float,
-    )
-    parser.option(
-        "--bending-stiffness EI",
-        "E I of the thinner part in N m^2: prints the compliance that differences along a line add",
-        float,
-    )
-    parser.heading("results")
-    parser.option("--out DIR", "folder for identification.json and figures", Path)
-    parser.option("--report FILE", "HTML page of the identification by method compliance", Path)
-    parser.option("--space", "add a 3D view with moving deformation to --report; needs plotly, adds 5 MB")
-    parser.option("--save FILE", "JSON file for the joint found by the first method", Path)
-    parser.option("--save-lines", "add K* of each line to --save; the file becomes many times as long")
-    parser.option(
-        "--export PROGRAM:J,K",
-        "write the joint found by the first method as input of abaqus, calculix (stiffness only), nastran or ansys, "
-        "between its nodes J and K: abaqus:9001,9002; rotations of calculix need two ROT NODEs after them; several "
-        "joints: abaqus:fl=9001,9002:fr=9003,9004",
-        parse_export,
-    )
-    add_card_arguments(parser)
+__all__ = ["run"]
 
 
 def run(args: argparse.Namespace) -> int:
@@ -168,6 +52,7 @@ def run(args: argparse.Namespace) -> int:
     _check_points(args)
     _check_window(args)
     check_stated(args)
+    stated_noise(args)
     with waiting(f"reading {file_names(args)}"):
         measured = read_measured(args)
         frfs = measured.receptance(args.window_decay or 0.0)
@@ -209,14 +94,12 @@ def _check_results(args: argparse.Namespace) -> None:
         check_extras("matplotlib")
         check_out("--out", args.out)
     if args.report is not None:
-        check_extras("jinja2", *(["plotly"] if args.space else []))
+        check_extras("jinja2")
         if "compliance" not in args.method:
             raise UsageError("--report needs method compliance; add it to --method")
         check_out("--report", args.report.parent)
         if args.report.is_dir():
             raise UsageError(f"--report: {args.report} is a folder; name a file")
-    elif args.space:
-        raise UsageError("--space needs a page; add --report FILE")
     check_folder("--save", args.save)
 
 
@@ -260,7 +143,17 @@ def _warn(args: argparse.Namespace, joint: MeasuredJoint, check: FrfCheck) -> No
     if "compliance" not in args.method:
         warn_of_ignored(
             args,
-            ("--damping", "--cross", "--noise", "--setup-gain", "--common-gain", "--window-decay"),
+            (
+                "--damping",
+                "--cross",
+                "--noise",
+                "--floor",
+                "--setup-gain",
+                "--common-gain",
+                "--sensor-mass",
+                "--window-decay",
+                "--position-error",
+            ),
             f"method {args.method[0]} uses no such option",
         )
     if joint.channels is not None or len(joint.nodes[0]) == 1:
@@ -305,7 +198,7 @@ def _write_results(
         fit = finished["compliance"]
         args.report.parent.mkdir(parents=True, exist_ok=True)
         written.append(write_report(fit, args.report, source=file_names(args), command=args.typed,
-                                    nodes=page_nodes(args), space=args.space))  # fmt: skip
+                                    nodes=page_nodes(args)))  # fmt: skip
     if args.out is not None:
         written += _write_figures(args, frfs, joint, fits)
     return text, written
@@ -409,16 +302,19 @@ def _of_compliance(
     args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, laws: LawJoint | None
 ) -> dict[str, Any]:
     """Return the options of the compliance fit: what is known of the channels, damping, cross terms, noise."""
-    known = joint.known(frfs)
+    noise = stated_noise(args)
+    known = joint.known(frfs, is_noise_stated=noise is not None)
     terms = {"damping": args.damping, "cross": args.cross} if laws is None else {"joint": laws}
     if args.same is not None:
         terms["same"] = args.same
     return {
         **known,
-        "noise": args.noise,
+        "noise": noise,
         "setups": setups_with_gains(args, known["setups"], joint.h.shape),
         "accept": args.accept or (),
+        "sensor_mass": args.sensor_mass,
         **({"window_decay": args.window_decay} if args.window_decay is not None else {}),
+        **({"position_error": args.position_error} if args.position_error is not None else {}),
         **terms,
     }
 

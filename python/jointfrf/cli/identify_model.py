@@ -17,7 +17,7 @@ from jointfrf.assembly_file.measured import MeasuredAssembly, measured_assembly
 from jointfrf.channels.check.check import stop_at_errors, wrong_numbers
 from jointfrf.cli.export import CardRequest, card_request, page_nodes, written_cards
 from jointfrf.cli.measured_file import file_names, read_measured, setups_with_gains
-from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.noise import stated_noise
 from jointfrf.cli.usage import Failures, Interrupt, Output, UsageError, listed, waiting
 from jointfrf.errors import ConvergenceWarning, FileContentError, FrfCheckWarning, IdentificationWarning
 from jointfrf.files import write_file
@@ -31,37 +31,18 @@ from jointfrf.report.fit_model import next_sentences
 from jointfrf.report.fit_page import write_report
 from jointfrf.spelling import some_of
 
-__all__ = ["add_model_arguments", "run_model"]
+__all__ = ["run_model"]
 
 #: What belongs to FRFs between all DOFs of the joint, and means nothing where there are models: option, attribute.
 _OF_THE_JOINT = (
     ("--j", "j"), ("--k", "k"), ("--dofs", "dofs"), ("--at", "at"), ("--at-k", "at_k"), ("--channels", "channels"),
     ("--spacing", "spacing"), ("--axis", "axis"), ("--law", "law"), ("--joint", "joint"),
-    ("--bending-stiffness", "bending_stiffness"), ("--side-j", "side_j"), ("--side-k", "side_k"),
+    ("--position-error", "position_error"), ("--bending-stiffness", "bending_stiffness"),
+    ("--side-j", "side_j"), ("--side-k", "side_k"),
     ("--window-decay", "window_decay"), ("--mass-j", "mass_j"), ("--mass-k", "mass_k"), ("--mass", "mass"),
 )  # fmt: skip
 #: Characters of a line of the table of several tests.
 _WIDTH = 100
-
-
-def add_model_arguments(parser: CommandParser) -> None:
-    """Describe the assembly, and several tests."""
-    parser.heading("an assembly of parts with models")
-    parser.option(
-        "--model FILE",
-        "assembly.toml: both parts as models or FRFs, the joint, other unknowns, the DOF of each channel; any FRFs of "
-        "the assembly suffice then",
-        Path,
-    )
-    parser.option(
-        "--each",
-        "with --model: fit every file as a test of its own (levels, assemblies) and print one table; the name of each "
-        "file is added to the files of --save, --report, --output and to the folder of --out",
-    )
-    parser.option(
-        "--find-wrong-channels",
-        "with --model: search for a channel of opposite sign or two exchanged channels that the models contradict",
-    )
 
 
 def run_model(args: argparse.Namespace) -> int:
@@ -160,8 +141,8 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
         warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
         warnings.simplefilter("ignore", FrfCheckWarning)
-        fit = measured.fit(noise=args.noise, find_wrong_channels=args.find_wrong_channels,
-                           accept=args.accept or ())  # fmt: skip
+        fit = measured.fit(noise=stated_noise(args), sensor_mass=args.sensor_mass,
+                           find_wrong_channels=args.find_wrong_channels, accept=args.accept or ())  # fmt: skip
     source, written, text = file_names(args), list[Path](), ""
     if not args.each:
         out.say("", fit)
@@ -181,7 +162,7 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
     if args.report is not None:
         args.report.parent.mkdir(parents=True, exist_ok=True)
         written.append(write_report(fit, args.report, source=source, command=args.typed, nodes=page_nodes(args),
-                                    parts=measured.sketched, space=args.space))  # fmt: skip
+                                    parts=measured.sketched))  # fmt: skip
     if args.out is not None:
         from jointfrf.report.fit import write_fit
 

@@ -4,47 +4,21 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
-from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import UsageError
 from jointfrf.identification.joint_file import read_joint_file
 from jointfrf.joint import Joint
-from jointfrf.laws.joint_toml import LAW_WORDS, read_joint_table, start_values
+from jointfrf.laws.joint_toml import read_joint_table, start_values
 from jointfrf.laws.law_joint import LawJoint
-from jointfrf.spelling import did_you_mean
 from jointfrf.toml.table import TomlTable
 
-__all__ = ["add_law_arguments", "joint_of_laws"]
+__all__ = ["joint_of_laws"]
 
 #: Damping of springs that --damping names, by what is zero in their first values.
 _SPRINGS = {
     "viscous": {"c": 10.0}, "hysteretic": {"h": 1e4}, "both": {"c": 10.0, "h": 1e4}, "auto": {"c": 10.0},
 }  # fmt: skip
-
-
-def _law(text: str) -> tuple[str, str]:
-    dof, equals, word = text.partition("=")
-    if not (dof.strip() and equals):
-        raise argparse.ArgumentTypeError(f"{text!r} is no DOF with a law; use the form y=standard-linear-solid")
-    word = word.strip()
-    if word not in LAW_WORDS:
-        hint = did_you_mean(word, LAW_WORDS)
-        raise argparse.ArgumentTypeError(f"unknown law {word!r}; use one of {', '.join(LAW_WORDS)}{hint}")
-    return dof.strip(), word
-
-
-def add_law_arguments(parser: CommandParser) -> None:
-    """Describe the options for the laws of the joint."""
-    parser.option(
-        "--law DOF=LAW",
-        f"law of a joint DOF, once for each DOF: y=standard-linear-solid, theta=rigid; one of {', '.join(LAW_WORDS)}; "
-        "a spring takes the damping of --damping (auto: viscous)",
-        _law,
-        repeated=True,
-    )
-    parser.option("--joint FILE", "TOML file of a joint of laws, with initial values", Path)
 
 
 def joint_of_laws(args: argparse.Namespace, dofs: Sequence[str]) -> LawJoint | None:

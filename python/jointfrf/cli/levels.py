@@ -11,15 +11,17 @@ from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
-from jointfrf.amplitude.amplitude_laws import AMPLITUDE_LAWS
 from jointfrf.amplitude.backbone import Backbone, backbone_levels
+from jointfrf.amplitude.decay import ModalDecay
 from jointfrf.amplitude.levels import JointLevel, JointLevels, levels
-from jointfrf.amplitude.lines import Drive, MotionQuantity
-from jointfrf.assembly_file.measured import measured_assembly
-from jointfrf.assembly_file.read import read_assembly_file
-from jointfrf.cli.measured_file import READING, add_joint_arguments, read_receptances, words
+from jointfrf.amplitude.lines import Drive
+from jointfrf.assembly_file.measured import MeasuredAssembly, measured_assembly
+from jointfrf.assembly_file.read import named_dof, read_assembly_file
+from jointfrf.choices import MotionQuantity
+from jointfrf.cli.decays import check_decay_arguments, levels_of_decays, modes_content, modes_csv, modes_of_decay
+from jointfrf.cli.measured_file import READING, read_receptances
 from jointfrf.cli.measured_joint import measured_joint
-from jointfrf.cli.parser import CommandParser, one_of
+from jointfrf.cli.noise import stated_noise
 from jointfrf.cli.usage import (
     Failures,
     Interrupt,
@@ -42,7 +44,7 @@ from jointfrf.messages.of_data import FATAL_CODES
 from jointfrf.report.levels_page import levels_csv, write_levels
 from jointfrf.spelling import did_you_mean
 
-__all__ = ["add_arguments", "run"]
+__all__ = ["run"]
 
 #: Options that say where FRFs at the joint are.
 _OF_THE_JOINT = ("--j", "--k", "--dofs", "--at", "--at-k", "--channels", "--spacing", "--axis")
@@ -58,91 +60,13 @@ class _Test(NamedTuple):
     level: float
 
 
-def add_arguments(parser: CommandParser) -> None:
-    """Describe the arguments of the command."""
-    parser.description = (
-        "Find stiffness and loss factor of a joint over the amplitude of its relative motion. The data are one file of "
-        "FRFs for each level, fitted with the models of assembly.toml or (as by identify) at the joint, or the "
-        "backbone of a mode. Laws over amplitude are fitted to all levels."
-    )
-    parser.requires("FILE", "--level", "--model")
-    parser.requires("FILE", "--level", "--j", "--k", "--dofs")
-    parser.requires("--table", "--model")
-    parser.requires("--backbone", "--channel", "--model")
-    parser.examples += [
-        "jointfrf levels --table cases/iwan-beam/tests.csv --model cases/iwan-beam/assembly.toml --held B/25:y",
-        "jointfrf levels --backbone cases/iwan-beam/backbone.csv --model cases/iwan-beam/assembly.toml --channel A/1:y",
-    ]
-    parser.add_argument("files", type=Path, nargs="*", metavar="FILE", help="measured FRFs, one file for each level")
-    parser.option(
-        "--model FILE", "assembly.toml, as for identify; without it the FRFs are at the joint (--j, --k)", Path
-    )
-    parser.option(
-        "--table FILE",
-        "CSV table of the tests instead of FILE: columns file (relative to the table), level, optionally label",
-        Path,
-    )
-    parser.heading("the controlled quantity of each test")
-    parser.option(
-        "--held WHAT",
-        "quantity that had its level on all lines: force, a response as the models name it (B/25:y; without models as "
-        "the file does, 101:+y), or joint:DOF for the relative motion of a joint DOF (joint:theta_z)",
-        default="force",
-    )
-    parser.option(
-        "--level LEVEL,...", "peak level of each file: N for a force, by --motion for a response, m or rad for a joint",
-        _numbers,
-    )  # fmt: skip
-    parser.option(
-        "--motion", "quantity of the level of a response: m, m/s or m/s^2", get_args(MotionQuantity), "displacement"
-    )
-    parser.heading("the backbone of a mode, instead of files")
-    parser.option(
-        "--backbone FILE",
-        "CSV table with columns frequency (Hz), amplitude (peak, by --motion) and damping (ratio) or, for tests at "
-        "phase resonance, force (peak, N); optionally label",
-        Path,
-    )
-    parser.option("--channel DOF", "DOF of the measured amplitude and of the force, as the models name it: A/1:y")
-    parser.option("--dof DOF", "joint DOF to be found, if several have a law")
-    parser.option(
-        "--errors FREQUENCY,DAMPING", "relative standard errors of frequency and of damping or force", _numbers,
-        [0.001, 0.05],
-    )  # fmt: skip
-    parser.heading("the fits")
-    parser.option(
-        "--noise LEVEL", "relative noise of the FRFs; 0.01 means 1 %%", float, otherwise="estimated from the FRFs"
-    )
-    parser.option("--laws NAME,...", "laws over amplitude to be fitted", _laws, list(AMPLITUDE_LAWS))
-    add_joint_arguments(parser)
-    parser.set_defaults(points=None)  # one joint point
-    parser.heading("results")
-    parser.option("--report FILE", "HTML page with figures of stiffness and loss factor over amplitude", Path)
-    parser.option("--output FILE", "CSV table of the result", Path)
-    parser.option(
-        "--joints DIR",
-        "folder for the joint of each level, springs of its secant stiffness and damping, as LABEL.toml for export and "
-        "couple",
-        Path,
-    )
-
-
-def _numbers(word: str) -> list[float]:
-    try:
-        return [float(one) for one in word.split(",")]
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{word!r} is no list of numbers; separate them by commas") from None
-
-
-def _laws(word: str) -> list[str]:
-    return [one_of(AMPLITUDE_LAWS)(one) for one in words(word)]
-
-
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
+    if args.decay is not None:
+        check_decay_arguments(args)
     if args.model is not None:
         warn_of_ignored(args, _OF_THE_JOINT, "--model defines the joint")
-    elif args.backbone is not None or args.j is None:
+    elif args.decay is None and (args.backbone is not None or args.j is None):
         why = (
             "add it for a backbone" if args.backbone is not None else "add it, or locate the joint by --j, --k, --dofs"
         )
@@ -155,26 +79,46 @@ def run(args: argparse.Namespace) -> int:
     if args.joints is not None:
         check_out("--joints", args.joints)
     out, failures, interrupt = Output(args), Failures(args), Interrupt()
-    if args.backbone is None:
+    modes = modes_of_decay(args) if args.decay is not None else []
+    if modes and args.model is None:
+        return _give_modes(args, out, modes)
+    if modes:
+        found, about = levels_of_decays(args, modes)
+    elif args.backbone is None:
         found, about = _of_fits(args, failures, interrupt)
     else:
         found, about = _of_backbone(args)
+    found = replace(found, left_out=dict(failures.found))
     written = []
     if args.report is not None:
-        written.append(write_levels(found, args.report, command=args.typed))
+        written.append(write_levels(found, args.report, command=args.typed, modes=modes))
     if args.output is not None:
         write_file(args.output, levels_csv(found))
         written.append(args.output)
     if args.joints is not None:
         written += _write_joints(found, args.joints)
-    out.say(found, *([""] if written else []), *(f"wrote {path}" for path in written))
+    shown = [each for one in modes for each in (replace(one, findings=()), "")]
+    out.say(*shown, found, *([""] if written else []), *(f"wrote {path}" for path in written))
     out.warn(*found.warnings)
     by_dof = {dof: [_by_name(one) for one in own] for dof, own in found.levels.items()}
     content = {"levels": by_dof, "failed": failures.found, "written": [str(path) for path in written]}
     out.give(about | asdict(replace(found, joints={})) | found.content() | content)
     failures.complain()
     interrupt.resume()
-    return 1 if found.refused or failures.found else 0
+    return 1 if failures.found else 0
+
+
+def _give_modes(args: argparse.Namespace, out: Output, modes: list[ModalDecay]) -> int:
+    """Print modes without a joint."""
+    written = [args.output] if args.output is not None else []
+    if written:
+        write_file(args.output, modes_csv(modes))
+    out.say(*(each for one in modes for each in (*([""] if one is not modes[0] else []), one)))
+    out.say(*(f"wrote {path}" for path in written))
+    out.warn(*(each for one in modes for each in one.warnings))
+    content = {"sources": [str(args.decay)], "written": [str(path) for path in written]}
+    out.give(modes_content(modes) | content | {"findings": [asdict(each) for one in modes for each in one.findings]})
+    return 0
 
 
 def _write_joints(found: JointLevels, folder: Path) -> list[Path]:
@@ -192,7 +136,7 @@ def _by_name(one: JointLevel) -> dict[str, Any]:
 
 def _of_fits(args: argparse.Namespace, failures: Failures, interrupt: Interrupt) -> tuple[JointLevels, dict[str, Any]]:
     """Return the levels of files, and the tests they are from."""
-    warn_of_ignored(args, ("--channel", "--dof", "--errors"), "no --backbone is given")
+    warn_of_ignored(args, ("--channel", "--dof", "--errors"), "neither --backbone nor --decay is given")
     tests, fits = _tests(args), dict[_Test, tuple[Fit, Drive]]()
     drives = {one: _drive(args, one) for one in tests}
     with warnings.catch_warnings():
@@ -217,7 +161,7 @@ def _of_backbone(args: argparse.Namespace) -> tuple[JointLevels, dict[str, Any]]
         raise UsageError("--backbone contains the levels; leave out files, --table and --level")
     if args.channel is None:
         raise UsageError("--channel is missing; name the DOF of the measured amplitude, such as A/1:y")
-    warn_of_ignored(args, ("--held", "--noise", "--band", *READING), "no file of FRFs is read")
+    warn_of_ignored(args, ("--held", "--noise", "--floor", "--band", *READING), "no file of FRFs is read")
     backbone = _backbone(args)
     file, lines = read_assembly_file(args.model), np.unique(backbone.freq_hz)
     parts = file.parts(lines)
@@ -256,8 +200,8 @@ def _backbone(args: argparse.Namespace) -> Backbone:
         amplitude = amplitude / (2 * np.pi * freq) ** get_args(MotionQuantity).index(args.motion)
     try:
         return Backbone(
-            args.channel, freq, amplitude, **{second: other}, freq_error=args.errors[0],
-            damping_error=args.errors[1], labels=tuple(columns.get(_LABEL, ())),
+            args.channel, freq, amplitude, other if second == "damping" else None, other if second == "force" else None,
+            freq_error=args.errors[0], damping_error=args.errors[1], labels=tuple(columns.get(_LABEL, ())),
         )  # fmt: skip
     except ValueError as error:
         raise FileContentError(f"{path}: {error}") from error
@@ -312,6 +256,23 @@ def _drive(args: argparse.Namespace, test: _Test) -> Drive:
         raise ValueError(f"{test.label}: {error}") from error
 
 
+def _of_models(drive: Drive, measured: MeasuredAssembly) -> Drive:
+    """Return what was held by the names of the models, checked before the fit; ``B/@0.28,0,0:y`` is a node there."""
+    if drive.held == "force":
+        return drive
+    name, _, own = drive.channel.partition("/")
+    found = drive
+    if drive.held == "response" and own.startswith("@") and name in measured.parts:
+        found = replace(drive, channel=f"{name}/{named_dof(measured.parts[name], own).dof}")
+    names = measured.responses if drive.held == "response" else measured.assembly.joint.dofs
+    if found.channel not in names:
+        what = "the controlled response" if drive.held == "response" else "the joint DOF"
+        at = f" ({drive.channel})" if found != drive else ""
+        hint = did_you_mean(found.channel, names)
+        raise UsageError(f"{what} {found.channel}{at} was not measured; use one of {', '.join(names)}{hint}")
+    return found
+
+
 def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Drive]:
     """Return the fit of a test, and what was held by the names of the fit."""
     own = argparse.Namespace(**vars(args) | {"files": [test.path]})
@@ -319,8 +280,9 @@ def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Driv
         frfs = read_receptances(own)
     if args.model is not None:
         measured = measured_assembly(args.model, frfs, bands=args.band)
+        drive = _of_models(drive, measured)
         with waiting(f"fit of {test.path.name}"):
-            return measured.fit(noise=args.noise, accept=FATAL_CODES), drive
+            return measured.fit(noise=stated_noise(args), accept=FATAL_CODES), drive
     joint = measured_joint(own, frfs)
     channels = [str(one) for one in joint.responses.channels]
     if drive.held == "response" and drive.channel not in channels:
@@ -329,8 +291,9 @@ def _fit(args: argparse.Namespace, test: _Test, drive: Drive) -> tuple[Fit, Driv
             f"--held {drive.channel}: {test.path.name} has no such channel; use one of {', '.join(channels)}{hint}"
         )
     with waiting(f"fit of {test.path.name}"):
-        known = joint.known(frfs)
-        fit = identify(frfs.freq_hz, joint.h, joint.dofs, args.band, noise=args.noise, accept=FATAL_CODES, **known)
+        noise = stated_noise(args)
+        known = joint.known(frfs, is_noise_stated=noise is not None)
+        fit = identify(frfs.freq_hz, joint.h, joint.dofs, args.band, noise=noise, accept=FATAL_CODES, **known)
     if drive.held == "response" and isinstance(fit.data, FitData):
         drive = replace(drive, channel=fit.data.response_names[channels.index(drive.channel)])
     return fit, drive

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import shlex
 import signal
@@ -9,6 +10,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext, redirect_stderr, redirect_stdout
+from importlib import import_module
 from types import FrameType
 from typing import Any, TextIO, cast
 
@@ -67,16 +69,17 @@ def _run(words: list[str], stop_if_interrupted: Callable[[], None]) -> int:
     if name not in COMMANDS:
         hint = did_you_mean(name, COMMANDS) or "; see jointfrf --help"
         raise UsageError(f"unknown command {name!r}{hint}")
-    parser = command_parser(name)  # imports the command
-    stop_if_interrupted()
+    parser = command_parser(name)
     args = parser.parse_words(words[1:])
     args.typed = shlex.join(["jointfrf", *words])
     args.warned = []
     args.stop_if_interrupted = stop_if_interrupted
     with shown_warnings(args.warned), _limited(args.limit_gb):
         parser.check_required(with_configuration(args, parser, name))
+        command = import_module(f"jointfrf.cli.{name}")
+        stop_if_interrupted()
         with nullcontext() if args.quiet else shown_progress(name):
-            status: int = args.action(args)
+            status: int = command.run(args)
         return status
 
 
@@ -149,6 +152,9 @@ def _read_or_not() -> Iterator[None]:
             stream = getattr(sys, name)
             if stream is None:  # closed before the start: print() would raise an error, or use the other stream
                 stream = stack.enter_context(open(os.devnull, "w", encoding="utf-8"))
+            elif isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+                # Names of files have characters that the encoding of a pipe, as on Windows, may lack.
+                stream.reconfigure(errors="backslashreplace")
             stack.enter_context(redirect(cast(TextIO, _Stream(stream))))
         yield
 

@@ -11,7 +11,6 @@ import numpy as np
 from jointfrf.assembly_file.side_part import SidePart
 from jointfrf.cli.measured_file import in_some_band
 from jointfrf.cli.measured_joint import MeasuredJoint
-from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import UsageError
 from jointfrf.errors import FileContentError
 from jointfrf.frf.noise_model import estimate_noise
@@ -21,21 +20,12 @@ from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.models.model import Model
 
-__all__ = ["add_mass_arguments", "check_masses", "check_stated", "scale_of_fit", "scale_of_joint"]
+__all__ = ["check_masses", "check_stated", "scale_of_fit", "scale_of_joint"]
 
 #: Options of stated masses, and the sides that they are of.
 _OPTIONS = {"mass_j": "j", "mass_k": "k", "mass": "j and k"}
 #: Lines of a look: those on the mass line are the lowest.
 _LINES = 400
-
-
-def add_mass_arguments(parser: CommandParser) -> None:
-    """Describe the masses that the user knows."""
-    parser.option(
-        "--mass-j KG", "mass of side j, kg: an error if the FRFs show another one (their unit is wrong)", float
-    )
-    parser.option("--mass-k KG", "mass of side k, kg", float)
-    parser.option("--mass KG", "mass of both sides together, kg", float)
 
 
 def check_stated(args: argparse.Namespace) -> None:

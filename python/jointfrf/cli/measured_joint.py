@@ -23,13 +23,15 @@ from jointfrf.channels.joint_channels import (
     offset_couplings,
 )
 from jointfrf.channels.point_lines import Interface, interface
-from jointfrf.cli.measured_file import Nodes, file_names, in_some_band, shown_nodes
+from jointfrf.cli.arguments.measured_file import Nodes, shown_nodes
+from jointfrf.cli.measured_file import file_names, in_some_band
 from jointfrf.cli.usage import UsageError, listed
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import Channel, ChannelPlace, JointSide, places_of_nodes
 from jointfrf.io import FrfSet, read_channel_table
 from jointfrf.io.channel_table import places_of_table
+from jointfrf.io.units import StatedUnits
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.toml.table import read_toml
 
@@ -94,10 +96,13 @@ class MeasuredJoint:
             return None
         return self.responses if self.responses is self.forces else (self.responses, self.forces)
 
-    def known(self, frfs: FrfSet) -> dict[str, Any]:
-        """Return what `identify` takes of the channels: to the joint DOFs, set-ups, coherence where the file has it."""
+    def known(self, frfs: FrfSet, *, is_noise_stated: bool) -> dict[str, Any]:
+        """Return what `identify` takes of the channels: to the joint DOFs, set-ups, coherence where the file has it.
+
+        Coherence is left out if the noise is stated.
+        """
         names = self.responses.channels, self.forces.channels
-        coherence = frfs.coherence_matrix(*names)
+        coherence = None if is_noise_stated else frfs.coherence_matrix(*names)
         shared = {} if coherence is None else {"coherence": coherence, "averages": frfs.least_averages(*names)}
         return {"transform": self.transform, "setups": frfs.setups_between(*names), **shared}
 
@@ -291,13 +296,15 @@ def _points(args: argparse.Namespace, nodes: tuple[list[int], list[int]]) -> Int
     channels = [channel for side in range(2) for one in pairs for channel in one.channels[side * n : (side + 1) * n]]
     dofs = tuple(f"{name}.{dof}" for name, one in zip(args.points, pairs, strict=True) for dof in one.dofs)
     ends = np.zeros(3), np.zeros(3)
-    return Interface(tuple(channels), np.eye(len(channels)), ends, dofs, np.zeros((len(channels), 12)))
+    return Interface(tuple(channels), np.eye(len(channels)), ends, dofs, np.zeros((len(channels), 12)), placed=False)
 
 
 def _table(args: argparse.Namespace) -> tuple[ChannelPlace, ...] | None:
     """Read the table of channels: the one that is named, or that of the project."""
     if args.channels is not None:
-        return read_channel_table(args.channels)
+        is_pair = "#" in args.channels.name and "," in args.channels.name  # two sheets of pyFBS, which have no unit
+        unit = StatedUnits.parsed(args.unit or "").coordinates if is_pair else ""
+        return read_channel_table(args.channels, position_unit=unit)
     if args.configuration is None:
         return None
     table = read_toml(args.configuration)

@@ -10,42 +10,22 @@ from typing import Any
 from jointfrf.assembly_file.keys import AssemblyKeys, PartsKeys
 from jointfrf.assembly_file.template import TEMPLATE
 from jointfrf.cases.catalogue import KINDS
-from jointfrf.cli.parser import CommandParser, one_of
+from jointfrf.cli.arguments.new import ASSEMBLY, STUDY
 from jointfrf.cli.usage import Output, UsageError
 from jointfrf.files import OwnFolder
 from jointfrf.toml.documents import key_template, schema_of
 
-__all__ = ["add_arguments", "run"]
+__all__ = ["run"]
 
 #: Name of the schema beside a new case.
 _SCHEMA = "case.schema.json"
-#: A case whose file has a design of factors.
-_STUDY = "study"
-#: No case: what `jointfrf identify --model` reads.
-_ASSEMBLY = "assembly"
-
-
-def add_arguments(parser: CommandParser) -> None:
-    """Describe the arguments of the command."""
-    parser.description = (
-        "Write the case.toml of a new case, with a comment for each key, and a JSON Schema for editors. The case runs "
-        f"unchanged. KIND is {', '.join(KINDS)}, or {_STUDY}: a case with a design of factors; or {_ASSEMBLY}: an "
-        "assembly.toml for identify --model."
-    )
-    parser.examples.append("jointfrf new known-joint my-case")
-    kinds = (*KINDS, _STUDY, _ASSEMBLY)
-    parser.add_argument("kind", metavar="KIND", choices=kinds, type=one_of(kinds), help="kind of the case")
-    parser.add_argument(
-        "folder", nargs="?", type=Path, metavar="FOLDER", help="new folder of the case (default: my-KIND)"
-    )
-    parser.option("--schema", "print the JSON Schema of case.toml instead")
 
 
 def run(options: argparse.Namespace) -> int:
     """Carry out the command."""
-    if options.kind == _ASSEMBLY:
+    if options.kind == ASSEMBLY:
         return _new_assembly(options)
-    is_study = options.kind == _STUDY
+    is_study = options.kind == STUDY
     top = KINDS[next(iter(KINDS)) if is_study else options.kind].keys
     schema = json.dumps(schema_of(top), indent=1) + "\n"
     if options.schema:

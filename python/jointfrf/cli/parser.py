@@ -263,12 +263,10 @@ def _gigabytes(word: str) -> float:
 
 
 def command_parser(name: str, parser: CommandParser | None = None) -> CommandParser:
-    """Return the parser of a command; only its module is imported."""
+    """Return the parser of a command; its arguments are imported, and nothing that carries it out."""
     parser = parser or CommandParser(prog=f"jointfrf {name}")
-    module = importlib.import_module(f"jointfrf.cli.{name}")
-    module.add_arguments(parser)
+    importlib.import_module(f"jointfrf.cli.arguments.{name}").add_arguments(parser)
     _add_common(parser)
-    parser.set_defaults(action=module.run)
     parser.describe_usage()
     return parser
 

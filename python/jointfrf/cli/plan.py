@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from dataclasses import asdict, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -16,8 +15,8 @@ from jointfrf.cases.catalogue import read_case_and_kind
 from jointfrf.cases.known_joint.exact import exact_frfs, frfs_by_differences
 from jointfrf.cases.known_joint.keys import KnownJointCase
 from jointfrf.cases.substructures import MeasuredStructure, ModelStructure
-from jointfrf.cli.frf import add_line_arguments, lines_of
-from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.frf import lines_of
+from jointfrf.cli.noise import noise_of
 from jointfrf.cli.usage import Output, UsageError, check_folder, listed, waiting, warn_of_ignored
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import FileContentError
@@ -28,10 +27,10 @@ from jointfrf.planning.joint_frfs import plan_joint_frfs
 from jointfrf.planning.plan import plan
 from jointfrf.report.plan_page import write_plan
 
-__all__ = ["add_arguments", "run"]
+__all__ = ["run"]
 
-#: Nodes of a part that are candidates unless they are named: their information is computed for all pairs.
-_CANDIDATES = 20
+#: Distances that differ by less, relative to their size, are the same.
+_ALIKE = 1e-9
 #: A file of this name is a case: FRFs between all joint DOFs.
 _CASE = "case.toml"
 #: Options of an assembly that mean nothing for a case.
@@ -39,90 +38,6 @@ _OF_PARTS = (
     "--sensors", "--hits", "--keep-sensors", "--keep-hits", "--candidates", "--sensor-mass", "--targets", "--criterion",
     "--within", "--budget", "--sensor-price", "--hit-price", "--spread", "--next",
 )  # fmt: skip
-
-
-def add_arguments(parser: CommandParser) -> None:
-    """Describe the arguments of the command."""
-    parser.description = (
-        "Plan a test of an assembly of parts with models: the sensors and impacts that determine the joint best, the "
-        "expected error of each parameter, the gain of one more sensor or impact, and the information by frequency."
-    )
-    parser.requires("--band", "--step")
-    parser.examples += [
-        "jointfrf plan cases/lap-beam/assembly.toml --band 20:1000 --step 2 --noise 0.02 --floor 0.01 --budget 5",
-        "jointfrf plan cases/3.3-beams-1mm/case.toml --band 10:500 --step 1 --spacings 0.001,0.005,0.02",
-    ]
-    parser.add_argument(
-        "model", type=Path, metavar="ASSEMBLY", help="assembly.toml with the expected joint, or case.toml"
-    )
-    add_line_arguments(parser)
-    parser.option(
-        "--sensors DOF,...",
-        "possible places of sensors: A/7:y,B/@0.1,0,0:y",
-        _dofs,
-        otherwise="translations of --candidates nodes",
-    )
-    parser.option("--hits DOF,...", "possible places of impacts or shakers", _dofs, otherwise="as for --sensors")
-    parser.option("--keep-sensors DOF,...", "sensors that are in every plan", _dofs)
-    parser.option("--keep-hits DOF,...", "impacts that are in every plan", _dofs)
-    parser.option("--candidates N", "number of nodes of each part, far from each other", int, _CANDIDATES)
-    parser.heading("noise and sensors")
-    parser.option("--noise LEVEL", "relative noise of one average of the FRFs; 0.01 means 1 %%", _positive, 0.01)
-    parser.option("--floor LEVEL", "noise floor of the accelerances, independent of the FRF, m/(s^2 N)", _positive)
-    parser.option("--averages N", "number of averages of each FRF", _positive, 1.0)
-    parser.option(
-        "--sensor-mass KG", "mass of each sensor, if the models lack it: prints the change of the parameters", _positive
-    )
-    parser.option(
-        "--spacings M,...",
-        "spacings of finite differences for rotations, m, with case.toml: prints the change of the parameters: "
-        "0.001,0.005", _spacings,
-    )  # fmt: skip
-    parser.heading("the goal")
-    parser.option("--targets NAME,...", "parameters to be found: k_y,c_y", _dofs, otherwise="all of the joint")
-    parser.option(
-        "--criterion", "A: mean of the squared relative errors, D: volume of their ellipsoid", ("A", "D"), "A"
-    )
-    parser.option("--within ERROR", "relative error at which the plan ends: 0.02", _positive)
-    parser.option("--budget COST", "largest total price of sensors and impacts", _positive)
-    parser.option("--sensor-price COST", "price of one sensor", _positive, 1.0)
-    parser.option("--hit-price COST", "price of one impact", _positive, 1.0)
-    parser.option(
-        "--spread S", "relative spread between assemblies: prints the number of assemblies to test; needs --next",
-        _positive,
-    )  # fmt: skip
-    parser.option(
-        "--next WIDTH", "relative half width of the prediction interval of the next assembly: 0.3; needs --spread",
-        _positive,
-    )  # fmt: skip
-    parser.option("--report FILE", "HTML page with sensors, impacts and the information by frequency", Path)
-
-
-def _positive(word: str) -> float:
-    try:
-        found = float(word)
-    except ValueError:
-        found = -1.0
-    if not 0 < found < float("inf"):
-        raise argparse.ArgumentTypeError(f"{word!r} is no number above zero; give one")
-    return found
-
-
-def _spacings(word: str) -> list[float]:
-    return [_positive(part) for part in word.split(",")]
-
-
-def _dofs(word: str) -> list[str]:
-    """Return DOFs between commas; positions hold commas themselves."""
-    found: list[str] = []
-    for part in word.split(","):
-        if found and "/@" in found[-1] and ":" not in found[-1]:
-            found[-1] += f",{part}"
-        else:
-            found.append(part.strip())
-    if not all(found):
-        raise argparse.ArgumentTypeError(f"{word!r} is no list of DOFs; use the form A/7:y,B/3:y")
-    return found
 
 
 def run(args: argparse.Namespace) -> int:
@@ -154,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     with waiting(f"plan of {args.model.name}"):
         assembly = file.assembly(freq, parts, used)
         found = plan(
-            assembly, freq, chosen[0], chosen[1], noise=args.noise, floor=args.floor or 0.0,
+            assembly, freq, chosen[0], chosen[1], noise=noise_of(args.noise, args.floor),
             averages=args.averages, targets=args.targets, criterion=args.criterion, within=args.within,
             budget=args.budget, sensor_price=args.sensor_price, hit_price=args.hit_price, sensors=kept[0], hits=kept[1],
             sensor_mass=args.sensor_mass or 0.0, fixed=file.keys.fixed,
@@ -196,7 +111,7 @@ def _of_case(args: argparse.Namespace, freq: FloatArray, out: Output) -> int:
     exact = exact_frfs(case)
     biased = {f"{1e3 * spacing:g} mm": frfs_by_differences(case, spacing) for spacing in args.spacings or ()}
     found = plan_joint_frfs(
-        freq, exact.interface(exact.h_c), case.joint, noise=args.noise, floor=args.floor or 0.0,
+        freq, exact.interface(exact.h_c), case.joint, noise=noise_of(args.noise, args.floor),
         averages=args.averages, biased=biased or None,
     )  # fmt: skip
     written = [] if args.report is None else [write_plan(found, args.report, command=args.typed)]
@@ -259,6 +174,7 @@ def _far_apart(places: dict[str, FloatArray], most: int) -> list[str]:
     chosen = [0]
     away = np.linalg.norm(at - at[0], axis=1)
     while len(chosen) < min(most, len(names)):
-        chosen.append(int(np.argmax(away)))
+        # Of places that are equally far, but for rounding, the first.
+        chosen.append(int(np.argmax(away >= (1 - _ALIKE) * away.max())))
         away = np.minimum(away, np.linalg.norm(at - at[chosen[-1]], axis=1))
     return [names[i] for i in sorted(chosen)]

@@ -16,26 +16,15 @@ from threading import Lock
 from jointfrf.cases.catalogue import UnknownCaseError, find_case, list_cases, run_case
 from jointfrf.cases.keys import Case
 from jointfrf.cases.workers import Workers, started_workers
-from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_out, positive, waiting
+from jointfrf.cli.usage import Output, UsageError, check_out, waiting
 from jointfrf.extras import check_extras
 from jointfrf.parallel.pool import available_cores
 from jointfrf.report.table import Table, as_text
 
-__all__ = ["add_arguments", "run"]
+__all__ = ["run"]
 
 #: Cases under way at the same time, where processes share the work.
 _TOGETHER = 3
-
-
-def add_arguments(parser: CommandParser) -> None:
-    """Describe the arguments of the command."""
-    parser.description = "Run cases by name, number or folder; without any, all cases that come with jointfrf."
-    parser.examples.append("jointfrf run 3.1 --realisations 20 --out results")
-    parser.add_argument("cases", nargs="*", metavar="CASE", help="name, number, or folder with a case.toml")
-    parser.option("--out DIR", "folder for the results", Path, Path("results"))
-    parser.option("--realisations N", "number of realisations", positive, otherwise="the number in the case")
-    parser.option("--jobs N", "number of processes", positive, available_cores(), otherwise="all cores")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -58,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
         out.say(text)
         sys.stdout.flush()
 
-    with ThreadPoolExecutor(_TOGETHER) as threads, started_workers(options.jobs) as workers:
+    with ThreadPoolExecutor(_TOGETHER) as threads, started_workers(options.jobs or available_cores()) as workers:
         reports = _run_all(folders, options, workers, threads, say)
     if len(reports) > 1:
         out.say("Reports:", *(f"  {report}" for report in reports))

@@ -6,85 +6,24 @@ import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from jointfrf.cases.catalogue import UnknownCaseError
-from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_out, listed, positive, waiting, warn_of_ignored
+from jointfrf.cli.usage import Output, UsageError, check_out, listed, waiting, warn_of_ignored
 from jointfrf.extras import check_extras, import_extra
 from jointfrf.files import OwnFolder
 from jointfrf.parallel.pool import AnyExecutor, available_cores, check_processes, safe_environment
-from jointfrf.studies.design import Arrangement, StudyDesign, parse_factor
+from jointfrf.studies.design import StudyDesign, parse_factor
 from jointfrf.studies.result import StudyResult
 from jointfrf.studies.run import merge_studies, study
 
-__all__ = ["add_arguments", "run"]
+__all__ = ["run"]
 
 #: Options that merge does not use.
 _OF_COMPUTING = (
     "--realisations", "--factor", "--arrangement", "--estimator", "--noise", "--first", "--count", "--jobs",
     "--executor",
 )  # fmt: skip
-#: What --executor takes.
-_EXECUTORS = ("processes", "threads", "loky", "mpi", "dask:ADDRESS")
-
-
-def add_arguments(parser: CommandParser) -> None:
-    """Describe the arguments of the command."""
-    parser.description = (
-        "Estimate the joint of a case from many realisations of the noise, over a design of factors. Finished "
-        "realisations are kept in the folder: the same command continues an interrupted study. `jointfrf study merge "
-        "PART... --out DIR` merges parts."
-    )
-    parser.usage = "jointfrf study CASE [options]\n       jointfrf study merge PART [PART ...] --out DIR [options]"
-    parser.examples.append("jointfrf study 3.1 --realisations 20 --factor noise=0.01,0.03 --out study")
-    parser.add_argument(
-        "words",
-        nargs="+",
-        metavar="CASE | merge PART...",
-        help="name, number, or folder with a case.toml; or merge and the folders of parts",
-    )
-    parser.option("--realisations N", "number of realisations", _whole, otherwise="the number in the case")
-    parser.option(
-        "--factor NAME=V,V,...",
-        "values of noise, spacing, lines, stiffness, damping, or of a key of case.toml such as frequency.last or "
-        "joint.stiffness; a * before = multiplies; may be repeated",
-        default=[],
-        repeated=True,
-    )
-    every = "full: every combination of values; one-at-a-time: one factor at a time"
-    parser.option("--arrangement", every, get_args(Arrangement), "full")
-    parser.option(
-        "--estimator WORD", "method of identification; may be repeated", default=[], repeated=True,
-        otherwise="the methods in the case",
-    )  # fmt: skip
-    parser.option(
-        "--noise NAME", "noise of the case; may be repeated", default=[], repeated=True, otherwise="all in the case"
-    )
-    parser.option("--first N", "first realisation of a part of the study; needs --count", _whole)
-    parser.option("--count N", "number of realisations of a part; needs --first", positive)
-    parser.option("--jobs N", "number of workers", positive, otherwise="all cores")
-    parser.option("--executor WORD", f"kind of workers: {', '.join(_EXECUTORS)}", _executor, "processes")
-    parser.option("--out DIR", "folder for the results", Path, otherwise="studies/NAME of the case")
-    parser.option(
-        "--values FORMAT", "file of single realisations: parquet or npz; may be repeated", _format, [], repeated=True
-    )
-
-
-def _whole(word: str) -> int:
-    return positive(word, 0)
-
-
-def _executor(word: str) -> str:
-    if word not in _EXECUTORS[:-1] and not (word.startswith("dask:") and len(word) > len("dask:")):
-        raise argparse.ArgumentTypeError(f"unknown executor {word!r}; use one of {', '.join(_EXECUTORS)}")
-    return word
-
-
-def _format(word: str) -> str:
-    if word not in ("parquet", "npz"):
-        raise argparse.ArgumentTypeError(f"unknown format {word!r}; use parquet or npz")
-    return word
 
 
 def run(options: argparse.Namespace) -> int:

@@ -83,6 +83,8 @@ _WORDS = tuple(
         (r"\bforce_quantity\b", "--force-quantity"),
         (r"\blimit_gb=, --limit-gb", "--limit-gb"),
         (r"\bwindow_decay\b", "--window-decay"),
+        (r"^position_error needs (.*): give .*", r"--position-error needs \1; add --at, or leave --position-error out"),
+        (r"\bposition_error\b", "--position-error"),
         (r"^gamma ", "gamma, the FRFs between all joint DOFs, "),
         (r"\bgive models of these to identify_model\b", "name models of these by --model"),
         (r"\bset accept=\['([\w-]+)'\]", r"say --accept \1"),

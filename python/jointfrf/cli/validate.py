@@ -4,44 +4,19 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from pathlib import Path
 
 from jointfrf.channels.check.check import warn_of_sets
-from jointfrf.cli.couple import add_joint_arguments, coupled, renumbered, shifted
-from jointfrf.cli.frf import add_line_arguments, check_target, lines_of, measured_sets, read_structures
-from jointfrf.cli.measured_file import add_reading_arguments, reading_options
-from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.couple import coupled, renumbered, shifted
+from jointfrf.cli.frf import check_target, lines_of, measured_sets, read_structures
+from jointfrf.cli.measured_file import reading_options
 from jointfrf.cli.usage import Output, waiting
 from jointfrf.errors import FileContentError
 from jointfrf.frf.merge import merge_frfs
 from jointfrf.identification.joint_file import read_joint_file
 from jointfrf.identification.validation import compare_frfs
 from jointfrf.io import FrfSet, write_frfs
-from jointfrf.io.formats import format_names
 
-__all__ = ["add_arguments", "run"]
-
-
-def add_arguments(parser: CommandParser) -> None:
-    """Describe the arguments of the command."""
-    parser.description = (
-        "Compute an assembly with an identified joint and compare it with the measured assembly, by channel: amplitude "
-        "(4.11) and frequency (4.12) of the largest peak in the band, and the difference over the band. Use channels "
-        "that were not used in the identification, or transfer the joint to other parts and use a test of their "
-        "assembly."
-    )
-    parser.requires("--joint", "--j", "--k")
-    parser.examples.append(
-        "jointfrf validate cases/two-beams/a.toml cases/two-beams/b.toml assembly.uff --joint "
-        "cases/two-beams/joint.toml --j 11 --k 1 --renumber-b 100 --band 20:800"
-    )
-    parser.add_argument("a", type=Path, metavar="A", help="substructure A: file of FRFs, or model (.toml)")
-    parser.add_argument("b", type=Path, metavar="B", help="substructure B")
-    parser.add_argument("measured", nargs="+", type=Path, metavar="FILE", help="measured FRFs of the assembly")
-    add_joint_arguments(parser)
-    parser.option("--output FILE", f"file for the regenerated FRFs: {format_names(written=True)}", Path)
-    add_line_arguments(parser)
-    add_reading_arguments(parser)
+__all__ = ["run"]
 
 
 def run(args: argparse.Namespace) -> int:

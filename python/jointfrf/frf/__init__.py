@@ -5,11 +5,13 @@ setups        which FRF came from which set-up of a test
 merge         several sets as one
 bands         bands, means over them, errors of peaks in them; lines in chunks
 noise         pollution
-rational_fit  rational functions with common poles: how many, and where
-smoothing     smooth FRFs by them, many lines in pieces
+stated_noise  noise as a user states it
+smoothing     smooth FRFs by rational functions with common poles, many lines in pieces
 entry_groups  which entries are measured twice, are zero, or have their poles in common
 noise_parts   relative and constant part of the noise, its correlation, outlying lines
 calibration   errors of channels and set-ups that are smooth over frequency, by FRFs measured twice
+cross_axis    impacts and sensors off axis, by h_pq and h_qp
+moving_mass   mass of a sensor that moves from point to point, by h_pq and h_qp
 noise_model   noise of measured FRFs, from residuals and differences of reciprocal entries
 quantiles     medians and quantiles of small arrays
 

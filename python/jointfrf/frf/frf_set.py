@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jointfrf.choices import POWER_OF_I_OMEGA
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.frf.setups import SetUps
 from jointfrf.kernel.arguments import as_array, as_integer, as_nodes, as_not_negative, as_real, check_type
@@ -28,9 +29,6 @@ __all__ = [
     "places_of_nodes",
     "same_frf",
 ]
-
-#: How often a receptance is differentiated in time to give the quantity.
-POWER_OF_I_OMEGA = {"receptance": 0, "mobility": 1, "accelerance": 2}
 
 #: Quantities with their SI units, in messages.
 _PLURALS = {"receptance": "receptances m/N", "mobility": "mobilities (m/s)/N", "accelerance": "accelerances (m/s^2)/N"}

@@ -14,24 +14,29 @@ from jointfrf.frf.bands import line_slices
 from jointfrf.frf.calibration import CalibrationErrors, calibration_errors
 from jointfrf.frf.entry_groups import EntryGroup, entry_groups, reciprocity_noise
 from jointfrf.frf.noise_parts import (
-    NoiseTerms,
     ReciprocityDifferences,
     line_correlation,
-    line_levels,
     reciprocity_differences,
 )
 from jointfrf.frf.quantiles import medians
-from jointfrf.frf.rational_fit import OrderSearch
-from jointfrf.frf.smoothing import SmoothFrfs, checked_frfs, first_variance, joined, near_squares, pieces, smoothed
+from jointfrf.frf.smoothing import (
+    OrderSearch,
+    SmoothFrfs,
+    checked_frfs,
+    first_variance,
+    joined,
+    near_squares,
+    pieces,
+    smoothed,
+)
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray, as_integer, as_number, as_real, check_type
+from jointfrf.kernel.call import call_for_number
 
-__all__ = ["NoiseModel", "estimate_noise"]
+__all__ = ["NoiseModel", "acceleration_floor", "describes_better", "estimate_noise", "found_noise"]
 
 #: What the variance was found from.
 NoiseSource = Literal["residual", "reciprocity", "none"]
 
-#: Most of the noise power that residuals are corrected for: beyond, the correction would exceed a factor of five.
-_MOST_TAKEN = 0.8
 #: Smooth FRFs and noise model are found in turn so often at most, until variances change by less than a factor on
 #: nearly all lines: weights that are wrong by 1.5 on half of the lines cost 4 % of the efficiency.
 _MOST_TURNS = 4
@@ -39,12 +44,16 @@ _SETTLED = 1.5
 _SETTLED_SHARE = 0.97
 #: Differences that are so many times smaller than measured minus smooth do not contain the noise of driving points.
 _UNSEEN = 3.0
-#: Parts of the noise by entry and its variation over frequency are found in turn so often at most.
-_LEVEL_TURNS = 10
 #: Smooth FRFs that miss the measured ones by so many times the noise that differences show are refused.
 _MISSED = 2.0
 #: Of fewer lines the parts of the noise by entry are hardly known, and smooth FRFs are no nearer than measured ones.
 _COARSE = 50
+#: Odds of 20 to 1.
+_CLEARLY = 6.0
+#: Below this share of the median line a floor of acceleration does not grow any more, as sensors end there.
+_LOWEST = 1e-3
+#: FRFs are not reciprocal if differences that are smooth over frequency are larger, relative to the FRFs.
+_UNSYMMETRIC = 0.5
 #: Least relative noise for weights: systematic errors of measured FRFs are larger.
 _ROUNDING = 1e-4
 
@@ -53,15 +62,17 @@ _ROUNDING = 1e-4
 class NoiseModel:
     """Noise of measured FRFs.
 
-    E|e|^2 = line_level line_factor (relative^2 |h|^2 + floor^2 + coherence_factor^2 v), v the variance by
-    coherence.
+    E|e|^2 = line_level line_factor (relative^2 |h|^2 + floor^2 s + coherence_factor^2 v)
+
+    v is the variance by coherence. s is 1 for a floor that is constant in the FRFs. It is (f_m/f)^4, with the median
+    line f_m, for receptances whose accelerances have a constant floor.
 
     Attributes
     ----------
     relative : ndarray, shape (n_out, n_in)
         Relative part, 0.05 for 5 %.
     floor : ndarray, shape (n_out, n_in)
-        Part that is the same at all lines, in the unit of the FRF.
+        Part that does not depend on |h|, at the median line, in the unit of the FRF.
     coherence_factor : ndarray, shape (n_out, n_in)
         Noise over that by the coherence; 0 without coherence. Near 1 where it explains the noise alone.
     variance : ndarray, shape (n_freq, n_out, n_in)
@@ -83,6 +94,8 @@ class NoiseModel:
     calibration : CalibrationErrors or None
         Errors that are smooth over frequency, where h_pq and h_qp differ by more than noise: they are in neither
         variance nor inflation.
+    floor_of_acceleration : bool
+        Whether the floor is constant in acceleration.
     """
 
     relative: FloatArray
@@ -96,6 +109,11 @@ class NoiseModel:
     source: NoiseSource
     smooth: SmoothFrfs
     calibration: CalibrationErrors | None = None
+    floor_of_acceleration: bool = False
+
+    def floor_shape(self, freq_hz: FloatArray) -> FloatArray:
+        """Return s, by which the square of the floor depends on frequency, shape (n_freq,)."""
+        return acceleration_floor(freq_hz) if self.floor_of_acceleration else np.ones(freq_hz.size)
 
     @property
     def outlying(self) -> NDArray[np.intp]:
@@ -119,7 +137,7 @@ def estimate_noise(
     freq_hz: ArrayLike,
     h: ArrayLike,
     *,
-    reciprocal: bool = True,
+    reciprocal: bool | None = None,
     coherence: ArrayLike | None = None,
     averages: float | None = None,
     max_poles: int = 60,
@@ -133,8 +151,9 @@ def estimate_noise(
         Lines in Hz, all different, in any spacing.
     h : array_like, shape (n_freq, n_out, n_in)
         Measured FRFs.
-    reciprocal : bool
-        Whether h_pq and h_qp of square matrices are the same FRF.
+    reciprocal : bool, optional
+        Whether h_pq and h_qp of a square matrix are the same FRF, because responses and forces are the same points in
+        the same order. By default the FRFs decide.
     coherence : array_like, shape (n_freq, n_out, n_in), optional
         Ordinary coherence of each FRF, above 0, at most 1.
     averages : float, optional
@@ -152,7 +171,8 @@ def estimate_noise(
     Raises
     ------
     ValueError
-        As `smooth_frfs`; coherence out of range; averages without coherence, or below 1.
+        As `smooth_frfs`. Or coherence is out of range, averages have no coherence or are below 1; or a square matrix is
+        not reciprocal although `reciprocal` is true, or has too few lines to estimate its noise otherwise.
 
     Notes
     -----
@@ -161,9 +181,10 @@ def estimate_noise(
     coherence g^2 of n averages, v = (1 - g^2)/(n g^2) |h|^2 is E|e|^2; |h| alone has half of it as its variance. v
     enters as one more part with a factor of its own, so the residual, which sees all noise, decides how far the
     coherence is believed. Where h_pq and h_qp differ smoothly over frequency, by gains, delays and drifts of channels,
-    these differences are taken off first: they are `calibration`, not noise. More than 8192 lines are cut into pieces
-    of equal length, each with parts of its own; `variance` is by these, `relative`, `floor` and `coherence_factor` are
-    their root mean squares.
+    these differences are taken off first: they are `calibration`, not noise. If the rest of the differences is smooth
+    over frequency as well, and exceeds the noise that rational functions leave, `reciprocal` is false. More than 8192
+    lines are cut into pieces of equal length, each with parts of its own; `variance` is by these, `relative`, `floor`
+    and `coherence_factor` are their root mean squares.
 
     Examples
     --------
@@ -179,6 +200,55 @@ def estimate_noise(
         raise ValueError(f"max_poles must be 1 or more, not {max_poles}")
     if like is not None:
         check_type("like", like, NoiseModel)
+    order = np.argsort(freq, kind="stable")
+    differences = None if reciprocal is False else _differences(lines[order])
+    apart = 0.0 if differences is None else differences.asymmetry(lines[order])
+
+    def found(*, as_reciprocal: bool) -> NoiseModel:
+        return found_noise(
+            freq,
+            lines,
+            reciprocal=as_reciprocal,
+            coherence=coherence,
+            averages=averages,
+            max_poles=max_poles,
+            like=like,
+        )
+
+    if reciprocal is None and differences is not None:
+        model = found(as_reciprocal=True)
+        rest = lines if model.calibration is None else model.calibration.without(freq, lines)
+        left = _differences(rest[order])
+        if left is not None and left.are_smooth(rest[order]):
+            other = found(as_reciprocal=False)
+            if other.source == "residual" and left.ratio(other.variance[order]) > _MISSED:
+                return other
+        if apart <= _UNSYMMETRIC:
+            return model
+    if apart > _UNSYMMETRIC:
+        raise ValueError(
+            f"h_pq and h_qp differ by {100 * apart:.0f} % (median): h is not reciprocal. Give reciprocal=False if "
+            "responses and forces are different points"
+        )
+    return found(as_reciprocal=reciprocal is not False)
+
+
+def _differences(h: ComplexArray) -> ReciprocityDifferences | None:
+    """Return h_pq - h_qp of FRFs on lines in rising order."""
+    return reciprocity_differences(h, entry_groups(h, reciprocal=True))
+
+
+def found_noise(
+    freq: FloatArray,
+    lines: ComplexArray,
+    *,
+    reciprocal: bool = True,
+    coherence: ArrayLike | None = None,
+    averages: float | None = None,
+    max_poles: int = 60,
+    like: NoiseModel | None = None,
+) -> NoiseModel:
+    """Return the noise of checked FRFs, as `estimate_noise` does, whether they are reciprocal or not."""
     given = _coherence_variance(lines, coherence, averages)
     places = pieces(np.argsort(freq))
     if like is not None and (len(places) > 1 or like.variance.shape != lines.shape):
@@ -211,6 +281,13 @@ def estimate_noise(
     return replace(_joined(places, parts(), lines.shape), calibration=calibration)
 
 
+def acceleration_floor(freq_hz: FloatArray) -> FloatArray:
+    """Return the variance of receptances by noise that is constant in acceleration, 1 at the median line."""
+    middle = float(medians(freq_hz))
+    lowest = max(_LOWEST * middle, float(np.min(freq_hz, where=freq_hz > 0, initial=np.inf)))
+    return np.asarray((middle / np.maximum(freq_hz, lowest)) ** 4) if middle > 0 else np.ones(freq_hz.size)
+
+
 def _joined(places: list[NDArray[np.intp]], parts: Iterable[NoiseModel], shape: tuple[int, ...]) -> NoiseModel:
     """Return the noise of FRFs of this shape, pieces of the lines at their places; parts and inflation are means."""
     n_freq = shape[0]
@@ -224,14 +301,15 @@ def _joined(places: list[NDArray[np.intp]], parts: Iterable[NoiseModel], shape: 
             levels[:, own] = one.line_level, one.line_factor
             by_entry[:] += np.square([one.relative, one.floor, one.coherence_factor]) * len(own) / n_freq
             inflation += one.inflation * len(own) / n_freq
-            known.append((one.source, one.inflation_source))
+            known.append((one.source, one.inflation_source, one.floor_of_acceleration and len(places) == 1))
             yield one.smooth
 
     smooth_frfs = joined(places, smooth(), shape)
-    source, inflation_source = max(known, key=known.count)
+    source, inflation_source, of_acceleration = max(known, key=known.count)
     relative, floor, of_coherence = np.sqrt(by_entry)
     return NoiseModel(
-        relative, floor, of_coherence, variance, inflation, inflation_source, levels[0], levels[1], source, smooth_frfs
+        relative, floor, of_coherence, variance, inflation, inflation_source, levels[0], levels[1], source, smooth_frfs,
+        floor_of_acceleration=of_acceleration,
     )  # fmt: skip
 
 
@@ -307,8 +385,28 @@ def _estimated(
         smooth, variance, inflation = begun
     if not smooth.is_smooth:
         return _without_smoothing(lines, smooth, differences)
-    patience = _patience(differences)
-    for _ in range(_MOST_TURNS if begun is None else 0):
+    if begun is None:
+        model = _settled(lines, smooth, variance, inflation, given, differences)
+    else:
+        model = _model(lines.h, smooth, given, inflation or 1.0, differences, robust=False)
+    smooth = model.smooth
+    level = None if differences is None else _level_of_differences(lines, model, differences)
+    if level is not None:
+        return _without_smoothing(lines, replace(smooth, h=lines.h, is_smooth=False), differences, level)
+    inflation, source = _found_inflation(lines.h, differences, model)
+    return replace(model, inflation=inflation, inflation_source=source)
+
+
+def _settled(
+    lines: _NoisyLines,
+    smooth: SmoothFrfs,
+    variance: FloatArray,
+    inflation: float | None,
+    given: FloatArray | None,
+    differences: ReciprocityDifferences | None,
+) -> NoiseModel:
+    """Return the noise model when smooth FRFs and variances, found in turn, have settled."""
+    for _ in range(_MOST_TURNS):
         model = _model(lines.h, smooth, given, inflation or 1.0, differences, robust=True)
         inflation, _ = _found_inflation(lines.h, differences, model)
         before, variance = variance, lines.weighing(model.variance)
@@ -316,15 +414,10 @@ def _estimated(
         steps = abs(np.log(variance[:, shown] / before[:, shown]))
         settled = bool((steps < np.log(_SETTLED)).mean() > _SETTLED_SHARE)
         known = None if differences is None else inflation
-        smooth = lines.smoothed(variance, known, 0 if settled else patience, smooth.poles)
+        smooth = lines.smoothed(variance, known, 0 if settled else _patience(differences), smooth.poles)
         if settled:
             break
-    model = _model(lines.h, smooth, given, inflation or 1.0, differences, robust=False)
-    level = None if differences is None else _level_of_differences(lines, model, differences)
-    if level is not None:
-        return _without_smoothing(lines, replace(smooth, h=lines.h, is_smooth=False), differences, level)
-    inflation, source = _found_inflation(lines.h, differences, model)
-    return replace(model, inflation=inflation, inflation_source=source)
+    return _model(lines.h, smooth, given, inflation or 1.0, differences, robust=False)
 
 
 def _level_of_differences(lines: _NoisyLines, model: NoiseModel, differences: ReciprocityDifferences) -> float | None:
@@ -407,7 +500,7 @@ def _found_inflation(
     h: ComplexArray, differences: ReciprocityDifferences | None, model: NoiseModel
 ) -> tuple[float, NoiseSource]:
     if differences is not None:
-        return differences.inflation(model.variance, model.line_factor), "reciprocity"
+        return model.inflation, "reciprocity"
     shown = (model.variance > 0).all(axis=0)
     if h.shape[1] == h.shape[2] and np.allclose(h, h.swapaxes(1, 2), rtol=1e-8, atol=0):
         shown = np.triu(shown)
@@ -432,46 +525,42 @@ def _model(
     """
     n_freq, n_out, n_in = h.shape
     shown = (smooth.h != 0).any(axis=0)
-    taken = np.minimum(inflation * smooth.share[shown], _MOST_TAKEN)
-    noise = np.ascontiguousarray((h - smooth.h)[:, shown].T) / np.sqrt(1 - taken)[:, None]
-    squares = noise.real**2 + noise.imag**2
-    stacked = np.ones((2 if given is None else 3, *squares.shape))
-    stacked[0] = (smooth.h.real**2 + smooth.h.imag**2)[:, shown].T
-    if given is not None:
-        stacked[2] = given[:, shown].T
-    usual, factor, terms = np.ones(n_freq), np.ones(n_freq), None
-    # Outlying lines; with these left out, slow variation; where there is some, parts and it in turn until it stays, as
-    # parts that were found without it have taken up some of it; and outlying lines once more.
-    for turn in range(_LEVEL_TURNS + 2):
-        good = factor == 1
-        if terms is None or not good.all():
-            terms = NoiseTerms(stacked[:, :, good])
-        parts = terms.parts((squares / usual)[:, good], robust=robust or turn == 0)
-        terms = terms if good.all() else None
-        described = np.maximum(_described(parts, stacked) * usual, TINY)
-        variance = np.zeros(h.shape)
-        variance[:, shown] = described.T
-        levels = []
-        if differences is not None:
-            levels.append(differences.line_levels(variance, inflation))
-        if not robust or differences is None:
-            levels.append(line_levels(noise / np.sqrt(described), inflation))
-        factor = np.max([found.factor for found in levels], axis=0)
-        if turn > 0:
-            if (levels[-1].usual == 1).all():
-                break
-            if turn <= _LEVEL_TURNS:
-                usual = usual * levels[-1].usual
-    variance *= factor[:, None, None]
-    by_entry = np.zeros((3, n_out, n_in))
-    by_entry[: len(parts), shown] = np.sqrt(parts)
+    measured, fitted = (np.ascontiguousarray(frfs[:, shown].T) for frfs in (h, smooth.h))
+    known = np.zeros(measured.shape) if given is None else np.ascontiguousarray(given[:, shown].T)
+    pairs = _numbers(shown, differences)
+    first, second = pairs if pairs.size else np.zeros((2, 1), np.int32)  # the kernel takes no array without numbers
+    parts, entries = np.empty((3, len(measured))), np.empty(measured.shape)
+    usual, factor = np.empty((2, n_freq))
+    is_shaped, found, _ = call_for_number(
+        "estimate_noise",
+        (
+            *measured.shape, pairs.shape[1], int(robust), acceleration_floor(smooth.freq_hz),
+            measured, fitted, smooth.share[shown], known, first, second, inflation, parts, entries, usual, factor,
+        ),
+    )  # fmt: skip
+    variance, by_entry = np.zeros(h.shape), np.zeros((3, n_out, n_in))
+    variance[:, shown], by_entry[:, shown] = entries.T, parts
     relative, floor, of_coherence = by_entry
-    return NoiseModel(relative, floor, of_coherence, variance, inflation, "none", usual, factor, "residual", smooth)
+    return NoiseModel(
+        relative, floor, of_coherence, variance, found, "none", usual, factor, "residual", smooth,
+        floor_of_acceleration=bool(is_shaped),
+    )  # fmt: skip
 
 
-def _described(parts: FloatArray, terms: FloatArray) -> FloatArray:
-    """Sum of parts times terms, shape (n_entries, n_freq)."""
-    return np.asarray(np.einsum("te,tel->el", parts, terms))
+def _numbers(shown: NDArray[np.bool_], differences: ReciprocityDifferences | None) -> NDArray[np.int32]:
+    """Return the numbers, from 1, of both entries of each pair that differs, among those shown, shape (2, n_pairs)."""
+    if differences is None:
+        return np.zeros((2, 0), np.int32)
+    number = np.zeros(shown.shape, np.int32)
+    number[shown] = np.arange(1, np.count_nonzero(shown) + 1)
+    rows, columns = differences.rows, differences.columns
+    both = np.stack([number[rows, columns], number[columns, rows]])
+    return np.ascontiguousarray(both[:, both.all(axis=0)])
+
+
+def describes_better(loss: float, other: float) -> bool:
+    """Whether -2 log likelihood of another floor is clearly lower."""
+    return loss < other - _CLEARLY
 
 
 def _without_smoothing(

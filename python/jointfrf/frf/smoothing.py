@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from jointfrf.frf.bands import line_slices
 from jointfrf.frf.entry_groups import EntryGroup, entry_groups
 from jointfrf.frf.quantiles import medians
-from jointfrf.frf.rational_fit import Entries, OrderSearch, RationalFit, search_order
 from jointfrf.kernel.arguments import (
     TINY,
     ComplexArray,
@@ -23,8 +23,10 @@ from jointfrf.kernel.arguments import (
     as_real,
     check_finite_lines,
 )
+from jointfrf.kernel.call import call_for_number
 
 __all__ = [
+    "OrderSearch",
     "SmoothFrfs",
     "checked_frfs",
     "first_variance",
@@ -44,6 +46,24 @@ _EXACT = 1e-4
 _LIKE = 1.2
 #: Share of the median of |h|^2 that first weights add to |h|^2: a floor of 30 % of the median of |h|.
 _FIRST_FLOOR = 0.09
+
+
+@dataclass(frozen=True)
+class OrderSearch:
+    """Options of the search for the number of poles.
+
+    Attributes
+    ----------
+    inflation : float, optional
+        Lines that carry the noise of one independent line; found from the residual if it is None.
+    max_poles : int
+    patience : int
+        Orders in a row that may gain nothing before the search ends; 0 for no further poles.
+    """
+
+    inflation: float | None = 1.0
+    max_poles: int = 60
+    patience: int = 2
 
 
 @dataclass(frozen=True)
@@ -224,29 +244,41 @@ def smoothed(
     measured = SmoothFrfs(freq, h, False, (), 1.0, np.zeros((n_out, n_in)))
     if n_freq < _FEWEST_LINES or not h.any():
         return measured
-    unit = 2 * np.pi * freq.max()
-    values, share, fits = np.zeros_like(h), np.zeros((1, n_out, n_in)), []
+    values, share, poles = np.zeros_like(h), np.zeros((1, n_out, n_in)), []
     squares, freedom, is_exact = 0.0, 0.0, True
     for number, group in enumerate(groups):
-        before = start[number] / unit if len(start) == len(groups) else None
-        entries, fit = _smooth_group(freq, h, variance, group, search, before)
-        parameters = entries.n_parameters(len(fit.poles))
-        squares, freedom = squares + fit.squares, freedom + entries.n_data - parameters
-        is_exact = is_exact and _is_exact(entries, fit)
+        before = start[number] if len(start) == len(groups) else np.zeros(0, np.complex128)
+        fit = _smooth_group(freq, h, variance, group, search, before)
+        n_data, n_entries, n_poles = fit.smooth.size, len(fit.smooth), len(fit.poles)
+        parameters = n_entries * (n_poles + 1) + n_poles
+        squares, freedom, is_exact = squares + fit.squares, freedom + n_data - parameters, is_exact and fit.is_exact
         group.put(fit.smooth, values)
-        group.put((parameters / entries.n_data / np.where(group.repeated, 2, 1))[:, None], share)
-        fits.append(fit.poles * unit)
+        group.put((parameters / n_data / np.where(group.repeated, 2, 1))[:, None], share)
+        poles.append(fit.poles)
     level = float(np.sqrt(squares / max(freedom, 1)))
     if is_exact:
-        return replace(measured, poles=tuple(fits), level=level)
-    return SmoothFrfs(freq, values, True, tuple(fits), level, share[0])
+        return replace(measured, poles=tuple(poles), level=level)
+    return SmoothFrfs(freq, values, True, tuple(poles), level, share[0])
 
 
-def _is_exact(entries: Entries, fit: RationalFit) -> bool:
-    """Whether most residuals are errors of the rational functions rather than noise."""
-    left, smooth = entries.h - fit.smooth, fit.smooth
-    small = left.real**2 + left.imag**2 < _EXACT**2 * np.maximum(smooth.real**2 + smooth.imag**2, TINY)
-    return bool(2 * np.count_nonzero(small) > small.size)
+class _FittedPoles(NamedTuple):
+    """Rational functions through the FRFs of a group, one a row.
+
+    Attributes
+    ----------
+    poles : ndarray, shape (n_poles,)
+        rad/s.
+    smooth : ndarray, shape (n_entries, n_freq)
+    squares : float
+        Sum of |h - smooth|^2 over the variance.
+    is_exact : bool
+        Whether most residuals are errors of the rational functions rather than noise.
+    """
+
+    poles: ComplexArray
+    smooth: ComplexArray
+    squares: float
+    is_exact: bool
 
 
 def _smooth_group(
@@ -255,21 +287,29 @@ def _smooth_group(
     variance: FloatArray | None,
     group: EntryGroup,
     search: OrderSearch,
-    start: ComplexArray | None,
-) -> tuple[Entries, RationalFit]:
+    start: ComplexArray,
+) -> _FittedPoles:
     """Fit of one group."""
-    s = 1j * freq / freq.max()
     if variance is not None:
-        mean, spread = group.means(h, variance)
-        entries = Entries(s, mean, 1 / np.sqrt(spread))
-        return entries, search_order(entries, search, start)
+        return _fitted(freq, *group.means(h, variance), search, start)
     near = near_squares(h)
     mean, spread = group.means(h, first_variance(near, medians(near.T).T))
-    fit = search_order(Entries(s, mean, 1 / np.sqrt(spread)), search, start)
+    fit = _fitted(freq, mean, spread, search, start)
     count = np.where(group.repeated, 2, 1)[:, None]
-    weight = np.sqrt(count / ((3 * abs(fit.smooth) ** 2 + count * spread) / 4))
-    entries = Entries(s, mean, weight)
-    return entries, search_order(entries, search, fit.poles)
+    return _fitted(freq, mean, (3 * abs(fit.smooth) ** 2 / count + spread) / 4, search, fit.poles)
+
+
+def _fitted(
+    freq: FloatArray, h: ComplexArray, variance: FloatArray, search: OrderSearch, start: ComplexArray
+) -> _FittedPoles:
+    """Fit of FRFs, one a row, from poles `start`, or those at their peaks."""
+    poles, smooth = np.zeros(search.max_poles, np.complex128), np.empty_like(h)
+    poles[: len(start)] = start[: search.max_poles]
+    sizes = (*h.shape, search.max_poles, min(len(start), search.max_poles), search.patience, search.inflation or 0.0)
+    n_poles, squares, _ = call_for_number("smooth_frfs", (*sizes, freq, h, variance, poles, smooth))
+    left = h - smooth
+    small = left.real**2 + left.imag**2 < _EXACT**2 * np.maximum(smooth.real**2 + smooth.imag**2, TINY)
+    return _FittedPoles(poles[: int(n_poles)].copy(), smooth, squares, bool(2 * np.count_nonzero(small) > small.size))
 
 
 def first_variance(near: FloatArray, usual: FloatArray) -> FloatArray:

@@ -16,15 +16,27 @@ from jointfrf.identification.manifold.group_fit import GroupFit
 from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold.on_manifold import frfs_of_joint, project, smooth_compliance, starts_on_manifold
 from jointfrf.identification.manifold.prepare import FitProblem
-from jointfrf.identification.manifold.transforms import Transform, Transforms
+from jointfrf.identification.manifold.transforms import Transform, Transforms, as_transforms
+from jointfrf.identification.manifold.uncertainty import JointUncertainty
 from jointfrf.identification.minimise import inverse_information
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import solve
 
-__all__ = ["as_pair", "channel_names", "compliance_data", "information_shares", "line_compliance", "regenerated_frfs"]
+__all__ = [
+    "as_pair",
+    "channel_names",
+    "compliance_data",
+    "hidden_errors",
+    "information_shares",
+    "line_compliance",
+    "regenerated_frfs",
+]
 
 #: Steps of the projection.
 _STEPS = 30
+#: Errors whose effect is computed: a delay of all forces, s; sensors that all resonate at so many times the highest
+#: line; the share of noise in the power of the force; the standard deviation of positions, m.
+_DELAY, _RESONANCE, _FORCE_NOISE, _POSITION = 1e-6, 10.0, 0.01, 1e-3
 #: Directions of less information than this share of the largest are not seen by a line.
 _SEEN = 1e-10
 
@@ -58,6 +70,13 @@ def compliance_data(
         regenerated=partial(regenerated_frfs, found.estimate, frfs.n),
         line_compliance=partial(line_compliance, found.estimate, frfs.n),
         information=partial(information_shares, found.estimate),
+        hidden_errors=partial(
+            hidden_errors,
+            found.known,
+            found.estimate,
+            problem.freq_hz,
+            as_transforms(transform, frfs.measured).position_errors(_POSITION),
+        ),
     )
 
 
@@ -147,6 +166,36 @@ def line_compliance(found: JointEstimate, n: int) -> ComplexArray:
         compliance = solve(np.eye(own) - r * group.joint.springs, r, on_singular="nan")
         whole[np.ix_(known, group.dofs)] = np.einsum("ldd->ld", compliance)
     return whole
+
+
+def hidden_errors(
+    known: JointUncertainty,
+    estimate: JointEstimate,
+    freq_hz: FloatArray,
+    positions: tuple[FloatArray, FloatArray] | None,
+) -> dict[str, dict[str, float]]:
+    """Return the change of each parameter by errors that no FRF shows; as `FitData.hidden_errors`."""
+    omega = 2 * np.pi * freq_hz
+    errors = {
+        "delay": -1j * omega * _DELAY,
+        "resonance": ((omega / (_RESONANCE * omega.max())) ** 2).astype(complex),
+        "force-noise": np.full(freq_hz.size, -_FORCE_NOISE, complex),
+    }
+    names = [one.name for one in estimate.parameters]
+    found: dict[str, dict[str, float]] = {name: {} for name in (*errors, *([] if positions is None else ["position"]))}
+    for group in known.groups:
+        at = group.at
+        every = np.ones((1, *at.measured_shape), bool)
+        gradient, _ = next(at.errors(every, slice(0, freq_hz.size)))
+        steps = {name: [(gradient * error[:, None]).real.sum(axis=0) @ at.covariance] for name, error in errors.items()}
+        for effect in at.position_effects(positions):
+            steps["position"] = list(effect.steps(at.covariance))
+        for name, own in steps.items():
+            changes = np.nan_to_num(np.array(own) @ at.group.joint.theta_slope(at.group.x).T)
+            # Independent errors add as squares; a single one keeps its sign.
+            total = changes[0] if len(changes) == 1 else np.linalg.norm(changes, axis=0)
+            found[name] |= {names[i]: float(change) for i, change in zip(at.group.which, total, strict=True)}
+    return found
 
 
 def information_shares(found: JointEstimate) -> FloatArray:

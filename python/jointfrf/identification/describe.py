@@ -12,6 +12,7 @@ from scipy.special import ndtr, ndtri
 
 from jointfrf.dofs import Parameter, compliance_unit, parameters_shared
 from jointfrf.frf.calibration import CalibrationErrors, SetUpErrors
+from jointfrf.frf.moving_mass import MovingMass
 from jointfrf.identification.elastic_centre import elastic_centre
 from jointfrf.identification.fit_data import ModelData
 from jointfrf.identification.joint_alone import with_joint_alone
@@ -20,7 +21,7 @@ from jointfrf.identification.manifold.estimate import JointEstimate
 from jointfrf.identification.manifold.fit import DofDamping, ManifoldFit
 from jointfrf.identification.manifold.prepare import FitProblem, shown_percent
 from jointfrf.identification.manifold.transforms import Transforms
-from jointfrf.identification.model.fit import FoundModel, OpenDirection
+from jointfrf.identification.model.fit import GAIN, FoundModel, OpenDirection, common_gain
 from jointfrf.identification.model.joint_motion import FoundMotion
 from jointfrf.identification.model.next_channels import NextChannels
 from jointfrf.identification.model.prepare import Channels
@@ -91,7 +92,7 @@ def describe_springs(found: ManifoldFit, problem: FitProblem) -> Fit:
         "compliance",
         problem.dofs,
         dict(zip(names, result.theta[shared].tolist(), strict=True)),
-        found.covariance[shared[:, None], shared],
+        found.known.covariance[shared[:, None], shared],
         found.noise_level,
         found.residual_level,
         problem.freq_hz,
@@ -111,11 +112,12 @@ def describe_springs(found: ManifoldFit, problem: FitProblem) -> Fit:
         *_poor_springs(fit, intervals),
         *_misfit(found, problem),
         *_unknown_cross(result, fit.dofs, problem.options.cross),
-        *([] if found.alone is not None else _scattering(fit, found.spread.chance[shared])),
+        *([] if found.alone is not None else _scattering(fit, found.known.spread.chance[shared])),
         *_negative_damping(fit, intervals),
         *_choices(found.choices),
         *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
         *_calibration(problem.noise.calibration),
+        *_moving_mass(problem.noise.mass),
         *_outlying_lines(problem),
         *_small_residual(found, problem),
         *_sides(problem),
@@ -372,7 +374,9 @@ def _misfit(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
     misfit, noise = found.test, problem.noise
     by_part = noise.is_given and abs(misfit.ratio / np.sqrt(2) - 1) < _BY_PART
     why = "coupled" if found.cross_fits else "per-part" if by_part else ""
-    findings = _too_large(misfit, why) if not noise.is_assumed else []
+    # A fit without cross terms that ignored them has a finding of its own.
+    is_told = found.cross_fits and any(group.unknown_cross is not None for group in found.estimate.groups)
+    findings = [] if noise.is_assumed or is_told else _too_large(misfit, why)
     # What the inertia of sides changes over frequency is in the intervals of the joint alone.
     for trend in () if found.cross_fits or found.alone is not None else misfit.trends:
         low, high = trend.values.argmin(), trend.values.argmax()
@@ -409,7 +413,7 @@ def describe_laws(found: ManifoldFit, joint: LawJoint) -> Fit:
         dofs=problem.dofs,
         parameters=law_parameters(joint),
         estimate=result.theta[shared],
-        covariance=found.covariance[shared[:, None], shared],
+        covariance=found.known.covariance[shared[:, None], shared],
         noise_level=found.noise_level,
         residual_level=found.residual_level,
         freq_hz=problem.freq_hz,
@@ -430,6 +434,7 @@ def describe_laws(found: ManifoldFit, joint: LawJoint) -> Fit:
         *_law_trends(found.test),
         *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
         *_calibration(problem.noise.calibration),
+        *_moving_mass(problem.noise.mass),
         *_outlying_lines(problem),
         *_correlated(fit),
         *_equal_points(same),
@@ -495,21 +500,26 @@ def describe_model(found: FoundModel, channels: Channels) -> Fit:
     )  # fmt: skip
     is_log = {one.name: one.is_log for one in vector.fitted}
     said = [name for one in found.unseparated for name in one.names]
-    findings = [
-        *_model_residual(fit, found, channels),
-        *_model_error(found),
-        *poor_laws(fit, is_log, lambda name: found.intervals.of(name, 0.95)),
-        *_directions(found.directions, said),
-        *_separation(found),
-        *_groups_of_joints(found),
-        *_other_minimum(found.other),
+    findings = _model_residual(fit, found, channels)
+    if not found.has_failed:
+        findings += [
+            *_model_error(found),
+            *_model_gains(found, channels),
+            *_model_parts(found),
+            *poor_laws(fit, is_log, lambda name: found.intervals.of(name, 0.95)),
+            *_directions(found.directions, said),
+            *_separation(found),
+            *_groups_of_joints(found),
+            *_other_minimum(found.other),
+            *_priors(fit, found.directions, said),
+            *_correlated(fit),
+            *([] if found.minimum.converged else [Finding("not-converged")]),
+        ]
+    findings += [
         *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
         *_calibration(problem.noise.calibration),
-        *_priors(fit, found.directions, said),
-        *_correlated(fit),
+        *_moving_mass(problem.noise.mass),
     ]
-    if not found.minimum.converged:
-        findings.append(Finding("not-converged"))
     return fit.with_findings(findings)
 
 
@@ -534,9 +544,9 @@ def _model_residual(fit: Fit, found: FoundModel, channels: Channels) -> list[Fin
     if test.is_large or test.bands or test.responses or test.forces or test.neighbours > 4:
         is_uncovered = found.error is None or found.test_with_error.is_large
         numbers = {"ratio": test.ratio, "where": ", ".join(parts) or "everywhere"}
-        variant = "model-uncovered" if is_uncovered else "model"
+        variant = "model-failed" if found.has_failed else "model-uncovered" if is_uncovered else "model"
         findings.append(Finding("residual-large", numbers, tuple(about), bands, variant=variant))
-    if test.pulls:
+    if test.pulls and not found.has_failed:
         denied = [(fit.parameters[i].name, pull) for i, pull in test.pulls]
         pulls = tuple(f"{name} {pull:+.1f}" for name, pull in denied)
         findings.append(Finding("prior-contradicted", {"pulls": pulls}, tuple(name for name, _ in denied)))
@@ -544,19 +554,60 @@ def _model_residual(fit: Fit, found: FoundModel, channels: Channels) -> list[Fin
 
 
 def _model_error(found: FoundModel) -> list[Finding]:
-    """Say which error of the models the intervals allow for."""
+    """Say which errors of the models, and of a gain of all FRFs, the intervals allow for."""
     if found.error is None:
         return []
-    level, left = found.error.level, found.test_with_error
+    own, left = found.error.model, found.test_with_error
+    if found.error.noise > 1 or found.error.shapes.level > 0:
+        numbers = {"level": own.level, "shapes": found.error.shapes.level, "noise": found.error.noise}
+        return [Finding("model-error", numbers, severity="warning", variant="far")]
+    level, common = own.level, found.error.gains.get("common-error")
     if level == 0:
-        whole = found.problem.prediction.whole
-        largest = max(found.error.of_part(part.error_level) for part in whole.parts.values())
-        return [Finding("model-error", {"level": largest}, variant="given")]
-    is_clear = found.error.gain > _CLEAR_GAIN or not found.test.is_noise
-    severity: Severity = "warning" if is_clear else "note"
+        believed = [side.part.error_level for side in found.problem.prediction.sides]
+        largest = float(own.of(believed).max()) if own.largest > 0 else 0.0
+        gain = 0.0 if common is None else float(common.of(common_gain(found.problem)))
+        variant = "given" if not gain else "gain" if not largest else "both"
+        return [Finding("model-error", {"level": largest, "gain": gain}, variant=variant)] if largest or gain else []
+    is_clear = own.gain > _CLEAR_GAIN or not found.test.is_noise
+    severity: Severity = "warning" if is_clear and found.error_matters else "note"
     if left.is_large:
         return [Finding("model-error", {"level": level, "ratio": left.ratio}, severity=severity, variant="large")]
     return [Finding("model-error", {"level": level}, severity=severity)]
+
+
+def _model_gains(found: FoundModel, channels: Channels) -> list[Finding]:
+    """Name the gains that the FRFs contradict, the largest deviation first."""
+    named = {"response-error": ("response", channels.responses), "force-error": ("force", channels.forces)}
+    gains, about = list[str](), list[str]()
+    for one in sorted(found.gains, key=lambda gain: -abs(gain.value - 1))[:_SHOWN]:
+        what, names = named.get(one.origin, ("", ()))
+        if names:
+            about.append(names[one.channel])
+        who = f"{what} {names[one.channel]}" if names else "all FRFs"
+        gains.append(f"{who} {one.value:.4g} +- {one.std:.1g}")
+    if not gains or found.test_with_error.is_large:  # of models that do not fit, gains are none
+        return []
+    # As far off as sensors and hammers usually are, it is no reason to doubt the fit.
+    is_unusual = max(abs(one.value - 1) for one in found.gains) > float(ndtri(0.975)) * GAIN
+    severity: Severity = "warning" if found.error_matters and is_unusual else "note"
+    return [Finding("model-gain", {"gains": tuple(gains)}, tuple(about), severity=severity)]
+
+
+def _model_parts(found: FoundModel) -> list[Finding]:
+    """Name parameters of the joint on which parts of the band do not agree."""
+    parts, findings, vector = found.parts, list[Finding](), found.problem.vector
+    for i in np.flatnonzero(parts.factor > 1):
+        if vector.fitted[i].origin != "joint":
+            continue
+        name, x, values = vector.fitted[i].name, found.minimum.x[: vector.free.size], list[str]()
+        for step, (low, high) in zip(parts.steps, parts.spans, strict=True):
+            if np.isfinite(step[i]):
+                there = vector.value(int(i), x + np.nan_to_num(step))
+                values.append(f"{there:.3g} at {low:.4g}-{high:.4g} Hz")
+        one, other = (f"{parts.spans[k][0]:.4g}-{parts.spans[k][1]:.4g} Hz" for k in parts.apart[i])
+        numbers = {"parameter": name, "values": ", ".join(values), "one": one, "other": other}
+        findings.append(Finding("band-parts-differ", numbers, (name,), parts.spans, variant="pair"))
+    return findings
 
 
 def _separation(found: FoundModel) -> list[Finding]:
@@ -675,6 +726,19 @@ def _noise(is_assumed: bool, inflation: float, freq_hz: FloatArray) -> list[Find
         numbers = {"lines": freq_hz.size, "independent": freq_hz.size / inflation}
         found.append(Finding("correlated-lines", numbers))
     return found
+
+
+def _moving_mass(mass: MovingMass | None) -> list[Finding]:
+    """Return the mass of a sensor that was removed: given, or found."""
+    if mass is None:
+        return []
+    where = "excitation" if mass.with_force else "response"
+    if mass.shown is not None:
+        numbers = {"mass": mass.mass, "where": where, "shown": mass.shown}
+        return [Finding("moving-mass", numbers, variant="contradicted")]
+    if mass.std_error == 0:
+        return [Finding("moving-mass", {"mass": mass.mass, "where": where}, severity="note", variant="given")]
+    return [Finding("moving-mass", {"mass": abs(mass.mass), "error": mass.std_error, "where": where})]
 
 
 def _calibration(errors: CalibrationErrors | None) -> list[Finding]:

@@ -12,7 +12,8 @@ from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import check_type
 
 if TYPE_CHECKING:
-    from jointfrf.io.cards import CardFormat, CardOptions
+    from jointfrf.io.card_link import CardFormat
+    from jointfrf.io.cards import CardOptions
 
 __all__ = ["cards"]
 
@@ -104,16 +105,20 @@ def _cards_of_points(
     if given:
         raise ValueError(f"{given[0]} is of one joint point: write the cards of each, fit.at_point")
     element, number = options.get("element", 1), options.get("number", 1)
+    auxiliary = options.get("damping_nodes")
     sets: list[int] = []
     for point in fit.points:
         ends = nodes[point]
         own: CardOptions = {**options, "element": element, "number": number, "rotation_nodes": ends[2:] or None}
+        if auxiliary is not None:
+            own["damping_nodes"] = auxiliary
         text = cards(
             fit.at_point(point), program, ends[:2], about=[*about, f"joint point {point}"], all_damping=all_damping,
             bounds=bounds, freq_hz=freq_hz, **own,
         )  # fmt: skip
         # Beyond every element and property that these lines name.
         element, number = element + len(text.splitlines()), number + len(text.splitlines())
+        auxiliary = None if auxiliary is None else auxiliary + len(text.splitlines())
         sets += [own["number"]] if "\nMPC*" in text else []
         yield text
     if len(sets) > 1:  # a run of Nastran takes one set of equations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,6 +54,11 @@ class FitData:
         at FRFs that fit the joint, so without the bias of an inverse of noise. NaN where a line does not give it.
     information : callable
         Returns the share of each line in what is known of each parameter, shape (n_freq, p).
+    hidden_errors : callable
+        Returns the change of each parameter, by its name, by errors that no FRF shows: ``"delay"``, 1 us of all forces;
+        ``"resonance"``, sensors that all resonate at ten times the highest line; ``"force-noise"``, 1 % of noise in the
+        power of the force, with H1; ``"position"``, positions of channels of standard deviation 1 mm, if an `Interface`
+        states them.
     """
 
     measured: ComplexArray
@@ -72,6 +77,7 @@ class FitData:
     regenerated: Callable[[slice], ComplexArray]
     line_compliance: Callable[[], ComplexArray]
     information: Callable[[], FloatArray]
+    hidden_errors: Callable[[], Mapping[str, Mapping[str, float]]]
 
     def noise_variance(self, lines: slice) -> FloatArray:
         """Return E|e|^2 of the noise found on some lines, shape (lines, m_r, m_f); inf where an FRF is not used."""

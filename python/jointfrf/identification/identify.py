@@ -14,11 +14,12 @@ from jointfrf.channels.check.check import as_accepted, check_frfs, stop_at_error
 from jointfrf.channels.check.result import FrfCheck
 from jointfrf.frf.bands import spread_lines
 from jointfrf.frf.setups import SetUps
+from jointfrf.frf.stated_noise import StatedNoise
 from jointfrf.identification.compliance_data import as_pair, channel_names, compliance_data
 from jointfrf.identification.describe import describe_laws, describe_springs
 from jointfrf.identification.exponential_window import unstated_window, without_window
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
-from jointfrf.identification.manifold.fit import fit_laws, fit_springs
+from jointfrf.identification.manifold.fit import ManifoldFit, fit_laws, fit_springs
 from jointfrf.identification.manifold.prepare import (
     FitOptions,
     FitProblem,
@@ -48,12 +49,14 @@ def identify(
     damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms] | None = None,
     cross: CrossTerms | None = None,
     same: Sequence[str] | Sequence[Sequence[str]] | None = None,
-    noise: float | ArrayLike | None = None,
+    noise: float | StatedNoise | ArrayLike | None = None,
     coherence: ArrayLike | None = None,
     averages: float | None = None,
     setups: SetUps | None = None,
+    sensor_mass: float | None = None,
     reciprocal: bool = True,
     window_decay: float = 0.0,
+    position_error: float = 0.0,
     sides: tuple[SideModel, SideModel] | None = None,
     accept: Sequence[str] = (),
 ) -> Fit:
@@ -88,13 +91,13 @@ def identify(
     cross : {"zero", "ignore", "points", "fit"}
         Terms that couple the DOFs of the joint: none (the default), and this is used; unknown and not fitted; fitted
         between the DOFs of each point, so that K* is a block for each, and none between points; fitted, symmetric.
-        Where they are unknown, k is 1/C_dd of the compliance.
+        If they are unknown, k is 1/C_dd of the compliance.
     same : sequence of str, or sequence of these, optional
         Points whose joints are equal, ``["bolt1", "bolt2"]``: they share all parameters, which are named at each.
-    noise : float or array_like, shape (n_freq, m_r, m_f), optional
-        Relative noise level of each entry, 0.01 for 1 %, sqrt(E|e|^2) of real and imaginary part together; or the
-        variance E|e|^2 of each, (m/N)^2. By default it is found by entry and frequency, as
-        `estimate_noise` does.
+    noise : float, StatedNoise or array_like, shape (n_freq, m_r, m_f), optional
+        Relative noise level of each entry, 0.01 for 1 %, sqrt(E|e|^2) of real and imaginary part together; or relative
+        part and floors; or the variance E|e|^2 of each, (m/N)^2. With `transform`, of each channel. By default it is
+        estimated by entry and frequency, as `estimate_noise` does.
     coherence, averages : optional
         As in `estimate_noise`, where `noise` is not given.
     setups : SetUps, optional
@@ -102,10 +105,16 @@ def identify(
         have in common, and what all have, is in the intervals, and set-ups that disagree are named in the findings.
     reciprocal : bool
         Whether the structure is reciprocal, so that gamma_pq and gamma_qp may be averaged.
+    sensor_mass : float, optional
+        Mass of the accelerometer that moves from point to point, kg. By default it is found from h_pq - h_qp, if
+        responses and forces are translations at the same points, and removed with a warning; 0 if no mass moves.
     window_decay : float
         Decay sigma of an exponential window exp(-sigma t) on the responses, 1/s, default 0. The receptances must be
         those at s = i w + sigma: divide an accelerance by s^2 and a mobility by s (`FrfSet.receptance`). Stiffnesses of
         springs are larger there by sigma c, which is subtracted.
+    position_error : float
+        Standard deviation of the position of each channel along each axis, m, default 0. Intervals of rotations cover
+        it. Needs an `Interface`; FRFs do not show such errors if the points of a side determine its motion exactly.
     sides : pair of SideModel, optional
         Models of both sides j and k, free of each other, that bend between channels and joint: the FRFs are corrected
         by them first, and what is not known of the models is in weights and intervals.
@@ -177,18 +186,24 @@ def identify(
         raise ValueError(f"window_decay {decay:g} corrects springs and dampers, not laws; leave out joint")
     if decay and sides is not None:
         raise ValueError(f"window_decay {decay:g}: models of sides give FRFs without a window; leave out sides")
-    options = FitOptions(damping or "auto", cross or "zero", reciprocal, equal)
+    stray = as_not_negative("position_error", position_error)
+    options = FitOptions(damping or "auto", cross or "zero", reciprocal, equal, stray)
+    mass = None if sensor_mass is None else as_not_negative("sensor_mass", sensor_mass)
     measured = as_measured(freq_hz, gamma, square=False)
-    problem = prepare_compliance(
+    arguments = (
         measured, dofs, bands, transform,
-        NoiseOptions(noise, coherence, averages, setups=setups), options, _check_sides(sides),
+        NoiseOptions(noise, coherence, averages, setups=setups, sensor_mass=mass), options, _check_sides(sides),
     )  # fmt: skip
+    problem = prepare_compliance(*arguments)
     accepted = as_accepted(accept)
     # Models of sides have corrected the FRFs of the problem.
     raw = None if sides is None else measured.h[np.isin(measured.freq_hz, problem.freq_hz)]
     of_data = _look_at(problem, transform, raw)
     stop_at_errors(of_data, accepted)
     if any(one.code == "amplitude-dependent" for one in of_data):
+        if problem.noise.cross_axis is not None:
+            # Forces of different motion break reciprocity, which looks like shares of other DOFs.
+            problem = prepare_compliance(*arguments, is_checked=True, is_reciprocal=False)
         problem = replace(problem, motion=motion_of_lines(problem.frfs.measured))
     if joint is None:
         found = fit_springs(problem)
@@ -203,9 +218,25 @@ def identify(
         fit = describe_laws(found, joint)
     fit = replace(fit, data=compliance_data(found, problem, transform))
     unstated = [] if decay else unstated_window(fit)
-    fit = fit.with_findings([*fit.findings, *unstated, *of_data])
+    fit = fit.with_findings([*fit.findings, *_off_axis(found, transform), *unstated, *of_data])
     fit.issue_warnings()
     return fit
+
+
+def _off_axis(found: ManifoldFit, transform: Transform | tuple[Transform, Transform] | None) -> list[Finding]:
+    """Name the channel with the largest share of another DOF; a note if noise exceeds the errors of all channels."""
+    axis, known = found.problem.noise.cross_axis, found.known
+    if axis is None:
+        return []
+    forces = channel_names(found.problem.frfs, found.problem.dofs, as_pair(transform))[1]
+    worst = int(np.argmax(abs(axis.share) * axis.size))
+    side, dof = divmod(int(axis.dofs[worst]), len(found.problem.dofs))
+    numbers = {
+        "share": float((abs(axis.share) * axis.size)[worst]), "error": float((axis.std_error * axis.size)[worst]),
+        "dof": f"{'jk'[side]}:{found.problem.dofs[dof]}",
+    }  # fmt: skip
+    severity: Literal["warning", "note"] = "warning" if (known.smooth > known.spread.factor).any() else "note"
+    return [Finding("off-axis", numbers, (forces[axis.channels[worst]],), severity=severity)]
 
 
 def _check_sides(sides: tuple[SideModel, SideModel] | None) -> tuple[SideModel, SideModel] | None:

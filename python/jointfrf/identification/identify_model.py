@@ -13,6 +13,7 @@ from jointfrf.channels.check.amplitude import motion_of_lines
 from jointfrf.channels.check.check import as_accepted, check_frfs, stop_at_errors, wrong_numbers_of
 from jointfrf.frf.bands import spread_lines
 from jointfrf.frf.setups import SetUps
+from jointfrf.frf.stated_noise import StatedNoise
 from jointfrf.identification.describe import describe_model
 from jointfrf.identification.identify import identify
 from jointfrf.identification.manifold.coordinates import CrossTerms
@@ -23,7 +24,7 @@ from jointfrf.identification.model.prepare import Channels, prepare_model_fit
 from jointfrf.identification.model.substructure import Unknown
 from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.result import Fit
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_lines, as_names, check_type
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_lines, as_names, as_not_negative, check_type
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
 from jointfrf.messages.finding import Finding
@@ -45,10 +46,11 @@ def identify_model(
     response_gains: Mapping[str, Unknown] | None = None,
     force_gains: Mapping[str, Unknown] | None = None,
     fixed: Sequence[str] = (),
-    noise: float | ArrayLike | None = None,
+    noise: float | StatedNoise | ArrayLike | None = None,
     coherence: ArrayLike | None = None,
     averages: float | None = None,
     setups: SetUps | None = None,
+    sensor_mass: float | None = None,
     find_wrong_channels: bool = False,
     accept: Sequence[str] = (),
 ) -> Fit:
@@ -71,10 +73,14 @@ def identify_model(
         Calibration factors of channels that are not exactly 1: measured = factor times true.
     fixed : sequence of str
         Parameters of the joint that keep the value they have in `assembly`, such as ``"c_y"``.
-    noise : float or array_like, shape of h, optional
-        Relative noise level of each FRF, or E|e|^2 of each, (m/N)^2. By default it is found, as `estimate_noise` does.
+    noise : float, StatedNoise or array_like, shape of h, optional
+        Relative noise level of each FRF, or its relative part and floors, or E|e|^2 of each FRF, (m/N)^2. By default it
+        is estimated, as `estimate_noise` does.
     coherence, averages : optional
         As in `estimate_noise`, where `noise` is not given.
+    sensor_mass : float, optional
+        Mass of the accelerometer that moves from point to point, kg. By default it is found from h_pq - h_qp, if
+        responses and forces are the same translations, and removed with a warning; 0 if no mass moves.
     setups : SetUps, optional
         Which FRF came from which set-up of the test, as `FrfSet.setups_between` returns it: what the FRFs of a set-up
         have in common, and what all have, is in the intervals, and set-ups that disagree are named in the findings.
@@ -148,7 +154,8 @@ def identify_model(
             raise TypeError(f"{name} must be a mapping of channels to Unknown, not {type(gains).__name__}")
     named = as_names("responses", responses), as_names("forces", forces)
     channels = Channels(*named, dict(response_gains or {}), dict(force_gains or {}))
-    known = NoiseOptions(noise, coherence, averages, setups=setups)
+    mass = None if sensor_mass is None else as_not_negative("sensor_mass", sensor_mass)
+    known = NoiseOptions(noise, coherence, averages, setups=setups, sensor_mass=mass)
     problem = prepare_model_fit(freq_hz, h, assembly, channels, known, fixed, _springs_at_joint)
     of_data = _look_at(problem, channels)
     stop_at_errors(of_data, [*as_accepted(accept), *(_SOUGHT if find_wrong_channels else ())])
@@ -190,11 +197,13 @@ def _look_at(problem: ModelProblem, channels: Channels) -> list[Finding]:
 def _changed(known: NoiseOptions, change: ChannelChange) -> NoiseOptions:
     """Return what is known of the noise and the set-up of each FRF with a change of the channels."""
 
-    def of(one: ArrayLike | None) -> ArrayLike | None:
-        return one if one is None or np.ndim(one) != 3 else change.of(np.asarray(one, float), signed=False)
+    def of(one: ArrayLike) -> ArrayLike:
+        return one if np.ndim(one) != 3 else change.of(np.asarray(one, float), signed=False)
 
     setups = None if known.setups is None else change.of_setups(known.setups)
-    return replace(known, noise=of(known.noise), coherence=of(known.coherence), setups=setups)
+    noise = known.noise if known.noise is None or isinstance(known.noise, StatedNoise) else of(known.noise)
+    coherence = None if known.coherence is None else of(known.coherence)
+    return replace(known, noise=noise, coherence=coherence, setups=setups)
 
 
 def _springs_at_joint(

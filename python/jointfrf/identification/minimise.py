@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from jointfrf.kernel.arguments import TINY, FloatArray
 
-__all__ = ["Linearised", "Minimum", "Squares", "full_step", "inverse_information", "minimise"]
+__all__ = ["Minimum", "NormalEquations", "Squares", "full_step", "inverse_information", "minimise"]
 
 #: Levenberg's parameter: first value, factors where a step succeeds and fails, smallest and largest value.
 _FIRST, _LOWERED, _RAISED, _SMALLEST, _LARGEST = 1e-3, 0.1, 8.0, 1e-9, 1e9
@@ -21,7 +21,7 @@ _ROUNDING = 1e-12
 _NOT_SOLVED, _SEEN = 1e-13, 1e-15
 
 
-class Linearised(NamedTuple):
+class NormalEquations(NamedTuple):
     """Squares about a point: cost, half of their second derivatives, and minus half of their first.
 
     Attributes
@@ -53,7 +53,7 @@ class Squares(Protocol):
     def cost(self, x: FloatArray) -> float:
         """Return the sum; inf where there is none."""
 
-    def linearised(self, x: FloatArray) -> Linearised:
+    def linearised(self, x: FloatArray) -> NormalEquations:
         """Return it with its derivatives; NaN where there is no sum."""
 
 
@@ -71,6 +71,8 @@ class Minimum(NamedTuple):
         Minus half of the first: zero but for coordinates at their bound.
     converged : bool
     at_bound : ndarray of bool, shape (p,)
+    promised : float
+        By how much the next step promises to lower the cost, if the iteration ended before a minimum.
     """
 
     x: FloatArray
@@ -79,6 +81,7 @@ class Minimum(NamedTuple):
     gradient: FloatArray
     converged: bool
     at_bound: NDArray[np.bool_]
+    promised: float = 0.0
 
 
 def minimise(
@@ -140,16 +143,19 @@ def minimise(
         if count == 2:
             converged = True
             break
-    return Minimum(x, at.cost, at.information, at.gradient, converged, (x <= lower) | (x >= upper))
+    left = 0.0
+    if not converged and np.isfinite(at.information).all():
+        left = _Steps(at, np.flatnonzero(free & _can_move(at, x, squares.bounds))).step(0.0)[1]
+    return Minimum(x, at.cost, at.information, at.gradient, converged, (x <= lower) | (x >= upper), left)
 
 
-def full_step(at: Linearised, x: FloatArray, bounds: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, float]:
+def full_step(at: NormalEquations, x: FloatArray, bounds: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, float]:
     """Return the minimum of squares by their derivatives at a point, and by how much it promises to be lower."""
     step, promised = _Steps(at, np.flatnonzero(_can_move(at, x, bounds))).step(0.0)
     return np.clip(x + step, *bounds), promised
 
 
-def _can_move(at: Linearised, x: FloatArray, bounds: tuple[FloatArray, FloatArray]) -> NDArray[np.bool_]:
+def _can_move(at: NormalEquations, x: FloatArray, bounds: tuple[FloatArray, FloatArray]) -> NDArray[np.bool_]:
     """Whether coordinates are not at a bound that the squares press them against."""
     lower, upper = bounds
     return ~(((x <= lower) & (at.gradient < 0)) | ((x >= upper) & (at.gradient > 0)))
@@ -158,7 +164,7 @@ def _can_move(at: Linearised, x: FloatArray, bounds: tuple[FloatArray, FloatArra
 class _Steps:
     """Steps from a point for any damping, by the eigenvectors of the information in units of each coordinate."""
 
-    def __init__(self, at: Linearised, moving: NDArray[np.intp]) -> None:
+    def __init__(self, at: NormalEquations, moving: NDArray[np.intp]) -> None:
         self.moving, self.p = moving, at.gradient.size
         self.size = np.sqrt(np.maximum(np.diagonal(at.information), TINY))[moving]
         scaled = at.information[np.ix_(moving, moving)] / np.outer(self.size, self.size)

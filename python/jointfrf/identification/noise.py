@@ -10,16 +10,26 @@ from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.bands import is_long, line_slices, spread_lines
 from jointfrf.frf.calibration import CalibrationErrors, calibration_errors
+from jointfrf.frf.cross_axis import CrossAxis
 from jointfrf.frf.entry_groups import ZERO, entry_groups
-from jointfrf.frf.noise_model import NoiseModel, estimate_noise
+from jointfrf.frf.moving_mass import MovingMass, found_mass, given_mass
+from jointfrf.frf.noise_model import NoiseModel, found_noise
 from jointfrf.frf.noise_parts import noise_parts
 from jointfrf.frf.quantiles import medians
-from jointfrf.frf.rational_fit import OrderSearch
 from jointfrf.frf.setups import SetUps
-from jointfrf.frf.smoothing import SmoothFrfs, near_squares, smoothed_in_pieces
+from jointfrf.frf.smoothing import OrderSearch, SmoothFrfs, near_squares, smoothed_in_pieces
+from jointfrf.frf.stated_noise import StatedNoise
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_real, check_type
 
-__all__ = ["KnownNoise", "NoiseOptions", "SmoothedFrfs", "noise_about", "noise_of_channels", "noise_of_matrix"]
+__all__ = [
+    "KnownNoise",
+    "NoiseOptions",
+    "SmoothedFrfs",
+    "noise_about",
+    "noise_of_channels",
+    "noise_of_matrix",
+    "without_mass",
+]
 
 #: Relative noise where neither the data nor the user give one: it is replaced by that of the residual.
 _ASSUMED_LEVEL = 0.01
@@ -29,8 +39,6 @@ _MISSED = 3.0
 _LEAST_LEVEL = 1e-7
 #: FRFs of single channels count as no smaller than this share of their largest line: their noise is then not zero.
 _LEAST_SIZE = 1e-6
-#: A floor counts where it raises the logarithm of the likelihood by more than this.
-_SIGNIFICANT = 4.0
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -38,19 +46,20 @@ _TINY = float(np.finfo(float).tiny)
 class NoiseOptions:
     """What is known of the noise, as in `identify`, `identify_model` and `estimate_noise`."""
 
-    noise: float | ArrayLike | None = None
+    noise: float | StatedNoise | ArrayLike | None = None
     coherence: ArrayLike | None = None
     averages: float | None = None
     like: NoiseModel | SmoothFrfs | None = None
     setups: SetUps | None = None
+    sensor_mass: float | None = 0.0
 
     def on_lines(self, kept: NDArray[np.bool_], shape: tuple[int, ...]) -> NoiseOptions:
         """Return the same for some of the lines of FRFs of a shape; what is not of this shape raises an error."""
         found = self
         if self.coherence is not None:
             found = replace(found, coherence=as_real("coherence", self.coherence, shape)[kept])
-        if self.noise is not None and np.ndim(self.noise) > 0:
-            found = replace(found, noise=as_real("noise", self.noise, shape)[kept])
+        if self._variances is not None:
+            found = replace(found, noise=as_real("noise", self._variances, shape)[kept])
         if self.setups is not None:
             check_type("setups", self.setups, SetUps)
             self.setups.check_fits(shape)
@@ -63,21 +72,30 @@ class NoiseOptions:
             return None
         return calibration_errors(freq, h, self.setups, reciprocal=reciprocal)
 
-    def level(self) -> float | None:
-        """Return the relative level where one is given; check that nothing else is."""
+    @property
+    def _variances(self) -> ArrayLike | None:
+        """The variance of each FRF, where it is given."""
+        if self.noise is None or isinstance(self.noise, StatedNoise):
+            return None
+        return self.noise if np.ndim(self.noise) > 0 else None
+
+    def stated(self) -> StatedNoise | None:
+        """Return the parts of the noise where they are given; check that nothing else is."""
         if self.noise is not None and (self.coherence is not None or self.averages is not None):
             raise ValueError("coherence and averages are used where noise is not given: leave one of them out")
-        if self.noise is None or np.ndim(self.noise) > 0:
+        if isinstance(self.noise, StatedNoise):
+            return self.noise
+        if self.noise is None or self._variances is not None:
             return None
         level = as_number("noise", self.noise)
         if level <= 0:
             raise ValueError(f"noise must be positive, not {level:g}")
-        return level
+        return StatedNoise(level)
 
     def variance(self, shape: tuple[int, ...], shown: NDArray[np.bool_]) -> FloatArray:
         """Return the variances given; positive for the FRFs that were measured, shape (n_o, n_i)."""
-        assert self.noise is not None
-        variance = as_real("noise", self.noise, shape)
+        assert self._variances is not None
+        variance = as_real("noise", self._variances, shape)
         if not (variance[:, shown] > 0).all():
             raise ValueError("noise must hold positive variances: E|e|^2 of each FRF that was measured")
         return variance
@@ -101,10 +119,16 @@ class KnownNoise:
         Noise of the channels, where it was found from their FRFs; not of long sweeps.
     is_given : bool
         Whether the user gave the noise.
+    stated : StatedNoise, optional
+        Noise that the user gave by its parts.
     smooth : SmoothFrfs, optional
         By noise that the user gave; not of long sweeps.
     calibration : CalibrationErrors, optional
         Errors of the FRFs that are smooth over frequency, where h_pq and h_qp show any.
+    mass : MovingMass, optional
+        Mass of a sensor that moves, which was removed from the FRFs.
+    cross_axis : CrossAxis, optional
+        Shares of other joint DOFs in the channels, whose differences were removed from the FRFs.
     """
 
     level: float
@@ -113,8 +137,11 @@ class KnownNoise:
     outlying: NDArray[np.intp]
     model: NoiseModel | None = None
     is_given: bool = False
+    stated: StatedNoise | None = None
     smooth: SmoothFrfs | None = None
     calibration: CalibrationErrors | None = None
+    mass: MovingMass | None = None
+    cross_axis: CrossAxis | None = None
 
     @property
     def like(self) -> NoiseModel | SmoothFrfs | None:
@@ -123,11 +150,15 @@ class KnownNoise:
 
     @classmethod
     def given(
-        cls, level: float, calibration: CalibrationErrors | None = None, smooth: SmoothFrfs | None = None
+        cls,
+        level: float,
+        calibration: CalibrationErrors | None = None,
+        smooth: SmoothFrfs | None = None,
+        stated: StatedNoise | None = None,
     ) -> KnownNoise:
         """Return noise of a level that the user gave."""
         none = np.empty(0, np.intp)
-        return cls(level, 1.0, False, none, is_given=True, smooth=smooth, calibration=calibration)
+        return cls(level, 1.0, False, none, is_given=True, stated=stated, smooth=smooth, calibration=calibration)
 
     @classmethod
     def found(cls, model: NoiseModel) -> KnownNoise:
@@ -154,27 +185,60 @@ class SmoothedFrfs(NamedTuple):
     noise: KnownNoise
 
 
+def without_mass(
+    freq: FloatArray, h: ComplexArray, mass: float | None, *, is_square: bool, is_translation: bool
+) -> tuple[ComplexArray, MovingMass | None]:
+    """Return FRFs without the mass of a sensor that moves from point to point, and this mass.
+
+    Parameters
+    ----------
+    freq : ndarray, shape (n_freq,)
+        Hz.
+    h : ndarray, shape (n_freq, n_o, n_i)
+        m/N.
+    mass : float or None
+        kg; None to find it, 0 for none.
+    is_square, is_translation : bool
+        Whether responses and forces are the same points, all measured, and all of them translations.
+
+    Raises
+    ------
+    ValueError
+        A mass is given, but the receptances at the points where the sensor stands were not measured.
+    """
+    if mass:
+        if not (is_square and is_translation):
+            raise ValueError(
+                f"sensor_mass {mass:g} kg can be removed only from FRFs of translations whose responses and forces are "
+                "the same points. Measure these, or add an AddedMass to a model"
+            )
+        found: MovingMass | None = given_mass(freq, h, mass)
+    elif mass is None and is_square and is_translation:
+        found = found_mass(freq, h)
+    else:
+        found = None
+    return (h, None) if found is None else (found.removed(freq, h), found)
+
+
 def noise_of_matrix(freq: FloatArray, h: ComplexArray, options: NoiseOptions, *, reciprocal: bool) -> SmoothedFrfs:
     """Return smooth FRFs and noise of a matrix of FRFs, all measured; a level is relative to the smooth FRFs."""
-    level = options.level()
+    stated = options.stated()
     # What is found below takes off what set-ups differ by as errors of channels, but does not know it as theirs.
     is_apart = options.noise is not None or options.setups is not None
     calibration = options.calibration(freq, h, reciprocal=reciprocal) if is_apart else None
     like = options.like.smooth if isinstance(options.like, NoiseModel) else options.like
-    if level is not None:
-        found = _smooth_at_level(freq, h, level, like, reciprocal=reciprocal)
-        known = KnownNoise.given(level, calibration, found)
-        variance = _relative_variance(found.h, level)
+    if stated is not None:
+        found = _smooth_by_stated(freq, h, stated, like, reciprocal=reciprocal)
+        variance = _stated_variance(freq, found.h, stated)
+        level = _usual_level(variance, h) if stated.has_floor else stated.relative
+        known = KnownNoise.given(level, calibration, found, stated)
     elif options.noise is not None:
         variance = options.variance(h.shape, np.ones(h.shape[1:], bool))
-        of_entry = np.median(np.sqrt(variance) / np.maximum(abs(h), _TINY), axis=0)
-        # Entries that are zero by symmetry have noise, but no relative noise.
-        usual = float(np.median(of_entry[of_entry < 1] if (of_entry < 1).any() else of_entry))
         begun = _smooth_like(freq, h, variance, like, reciprocal=reciprocal)
         found = begun or smoothed_in_pieces(freq, h, variance, OrderSearch(), reciprocal=reciprocal)
-        known = KnownNoise.given(usual, calibration, found)
+        known = KnownNoise.given(_usual_level(variance, h), calibration, found)
     else:
-        model = estimate_noise(
+        model = found_noise(
             freq, h, reciprocal=reciprocal, coherence=options.coherence, averages=options.averages,
             like=options.like if isinstance(options.like, NoiseModel) else None,
         )  # fmt: skip
@@ -196,18 +260,25 @@ def noise_of_matrix(freq: FloatArray, h: ComplexArray, options: NoiseOptions, *,
     return SmoothedFrfs(_near(smooth, h, variance), variance, known)
 
 
-def _smooth_at_level(
-    freq: FloatArray, h: ComplexArray, level: float, like: SmoothFrfs | None, *, reciprocal: bool
+def _usual_level(variance: FloatArray, h: ComplexArray) -> float:
+    """Return the median of the noise relative to the FRFs."""
+    of_entry = np.median(np.sqrt(variance) / np.maximum(abs(h), _TINY), axis=0)
+    # Entries that are zero by symmetry have noise, but no relative noise.
+    return float(np.median(of_entry[of_entry < 1] if (of_entry < 1).any() else of_entry))
+
+
+def _smooth_by_stated(
+    freq: FloatArray, h: ComplexArray, stated: StatedNoise, like: SmoothFrfs | None, *, reciprocal: bool
 ) -> SmoothFrfs:
-    """Return smooth FRFs, weighted by noise of a level relative to them."""
+    """Return smooth FRFs, weighted by noise whose relative part is relative to them."""
     if like is not None and np.array_equal(like.freq_hz, freq) and like.h.shape == h.shape:
-        begun = _smooth_like(freq, h, _relative_variance(like.h, level), like, reciprocal=reciprocal)
+        begun = _smooth_like(freq, h, _stated_variance(freq, like.h, stated), like, reciprocal=reciprocal)
         if begun is not None:
             return begun
     # Measured FRFs as weights favour lines that noise has made small.
-    variance = _relative_variance(np.sqrt(near_squares(h)), level)
+    variance = _stated_variance(freq, np.sqrt(near_squares(h)), stated)
     first = smoothed_in_pieces(freq, h, variance, OrderSearch(), reciprocal=reciprocal)
-    variance, poles = _relative_variance(first.h, level), first.poles
+    variance, poles = _stated_variance(freq, first.h, stated), first.poles
     del first
     return smoothed_in_pieces(freq, h, variance, OrderSearch(), reciprocal=reciprocal, start=poles)
 
@@ -238,7 +309,7 @@ def noise_of_channels(
     reciprocal : bool
         Whether responses and forces are the same channels, all measured.
     """
-    measured, level = np.where(shown, h, 0), options.level()
+    measured, stated = np.where(shown, h, 0), options.stated()
     kept = np.zeros(shown.shape, bool)
     for group in entry_groups(measured, reciprocal=False):
         kept[group.rows, group.columns] = True
@@ -246,9 +317,9 @@ def noise_of_channels(
     size = abs(measured)
     size = np.maximum(size, np.maximum(_LEAST_SIZE * size.max(axis=0), _TINY))
     if options.noise is not None:
-        variance = options.variance(h.shape, shown) if level is None else (level * size) ** 2
+        variance = options.variance(h.shape, shown) if stated is None else stated.variance(freq, size)
         calibration = options.calibration(freq, measured, reciprocal=reciprocal)
-        known = KnownNoise.given(np.nan if level is None else level, calibration)
+        known = KnownNoise.given(np.nan, calibration, stated=stated)
         return SmoothedFrfs(measured, np.where(kept, variance, np.inf), known)
     # Of a square matrix FRFs that are zero by symmetry may stay: reciprocity says more of the noise.
     taken = shown if reciprocal else kept
@@ -265,7 +336,7 @@ def noise_of_channels(
         return whole
 
     coherence = None if options.coherence is None else parts(as_real("coherence", options.coherence, h.shape))
-    found = estimate_noise(
+    found = found_noise(
         freq, np.asarray(parts(h), np.complex128), reciprocal=reciprocal and is_block, coherence=coherence,
         averages=options.averages,
     )  # fmt: skip
@@ -304,27 +375,32 @@ def _relative_variance(h: ComplexArray | FloatArray, level: float) -> FloatArray
     return variance
 
 
-def noise_about(squares: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return relative part and floor of the variance by entry, (relative^2, floor^2), shape (n_entries,) each.
+def _stated_variance(freq: FloatArray, h: ComplexArray | FloatArray, stated: StatedNoise) -> FloatArray:
+    """Return the variance of FRFs by the parts of their noise."""
+    variance = _relative_variance(h, stated.relative)
+    variance += stated.floor_variance(freq)[:, None, None]
+    return variance
+
+
+def noise_about(squares: FloatArray, size: FloatArray, shape: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Return relative part and floor of the variance by entry, shape (n_entries,) each, and -2 log likelihood.
 
     Parameters
     ----------
     squares : ndarray, shape (n_entries, n_freq)
         |e|^2 of measured minus fitted FRFs.
     size : ndarray, shape (n_entries, n_freq)
-        |h|^2 of the fitted ones.
+        |h|^2 of the fitted FRFs.
+    shape : ndarray, shape (n_freq,)
+        Variance by the floor, but for a factor.
 
     Notes
     -----
-    At antiresonances a small FRF may say most of all. A floor that the squares do not clearly show would hide it.
+    The variance has a relative part and a floor, the latter only if the squares clearly show it: at antiresonances a
+    small FRF may contain most information of all, which a floor would hide. One floor of all entries is preferred to
+    floors of their own that hardly describe the squares better: few lines of an entry show its own.
     """
     size = np.maximum(size, _TINY)
-    relative, floor = noise_parts(squares, np.stack([size, np.ones_like(size)]))
-    alone = (squares / size).mean(axis=1)
-
-    def likelihood(parts: FloatArray, rest: FloatArray) -> FloatArray:
-        variance = np.maximum(parts[:, None] * size + rest[:, None], _TINY)
-        return np.asarray(-(np.log(variance) + squares / variance).sum(axis=1))
-
-    shown = likelihood(relative, floor) > likelihood(alone, np.zeros_like(floor)) + _SIGNIFICANT
-    return np.where(shown, relative, alone), np.where(shown, floor, 0.0)
+    relative, floor = noise_parts(squares / shape, np.stack([size / shape, np.ones_like(size)]), common=True)
+    variance = np.maximum(relative[:, None] * size + floor[:, None] * shape, _TINY)
+    return relative, floor, 2 * float((np.log(variance) + squares / variance).sum())

@@ -5,19 +5,31 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.dofs import parameter_name
-from jointfrf.kernel.arguments import FloatArray
+from jointfrf.kernel.arguments import TINY, FloatArray
 from jointfrf.laws.law_joint import JointQuantity, LawJoint
+from jointfrf.laws.springs import SpringLaw
 
-__all__ = ["CommonMean", "FitParameter", "ParameterOrigin", "ParameterVector", "joint_vector"]
+__all__ = [
+    "CommonMean",
+    "ErrorOrigin",
+    "FitParameter",
+    "ParameterOrigin",
+    "ParameterVector",
+    "joint_vector",
+    "with_dampers",
+]
 
-#: What a parameter belongs to; a mean is that of several joints, an error one of the model of a part.
-ParameterOrigin = Literal["joint", "mean", "part", "attachment", "response", "force", "error"]
+#: Errors that nobody asked for by name: of modal matrices and mode shapes of a part, of the gain of a response, of a
+#: force, of all FRFs.
+ErrorOrigin = Literal["error", "shape-error", "response-error", "force-error", "common-error"]
+#: What a parameter belongs to; a mean is that of several joints.
+ParameterOrigin = Literal["joint", "mean", "part", "attachment", "response", "force"] | ErrorOrigin
 
 
 #: Stiffnesses of the joint are sought within this factor of the stiffness that the substructures have there; other
@@ -26,6 +38,12 @@ _WIDEST = 1e6
 #: No step changes a logarithm, or standard deviations of a prior, by more than this; nor does the first of a profile a
 #: logarithm.
 _LONGEST, _LONGEST_REACH = 1.0, 1.5
+
+
+#: Standard deviation of the prior of a loss factor: hardly a joint has one of 1.
+_LARGEST_LOSS = 1.0
+#: Loss factor by which damping that starts at zero is first changed; of a damper at this angular frequency, rad/s.
+_FIRST_LOSS, _FIRST_OMEGA = 0.01, 1000.0
 
 
 class FitParameter(NamedTuple):
@@ -50,6 +68,10 @@ class FitParameter(NamedTuple):
         Whether it is fitted.
     like : int or None
         Place among all of the parameter that it equals.
+    damps : int or None
+        Place among all of the stiffness that the prior of a hysteretic damping is relative to.
+    size : float
+        Unit of the coordinate of a parameter that starts at zero without a prior.
     """
 
     name: str
@@ -63,11 +85,13 @@ class FitParameter(NamedTuple):
     is_log: bool
     is_free: bool
     like: int | None = None
+    damps: int | None = None
+    size: float = 1.0
 
     @property
     def is_error(self) -> bool:
-        """Whether it is an entry of the error of a model, which nobody asked for by name."""
-        return self.origin == "error"
+        """Whether it is an error of a model or of a gain, which nobody asked for by name."""
+        return self.origin in get_args(ErrorOrigin)
 
 
 class CommonMean(NamedTuple):
@@ -93,7 +117,7 @@ class CommonMean(NamedTuple):
 
 @dataclass(frozen=True)
 class ParameterVector:
-    """The parameters of a fit; vectors hold the values of all, coordinates those of the free ones.
+    """The parameters of a fit; vectors contain the values of all, coordinates only the free ones.
 
     Attributes
     ----------
@@ -133,7 +157,7 @@ class ParameterVector:
     @cached_property
     def scale(self) -> FloatArray:
         """Unit of the coordinate of each free one that is not a logarithm."""
-        return np.array([one.std or abs(one.value) or 1.0 for one in self.fitted])
+        return np.array([one.std or abs(one.value) or one.size for one in self.fitted])
 
     def to_coordinates(self, values: FloatArray) -> FloatArray:
         """Return the coordinates of values of all."""
@@ -166,9 +190,9 @@ class ParameterVector:
         return found
 
     def _own(self, x: FloatArray) -> FloatArray:
-        logs = np.where(self.is_log, np.clip(x, *self.bounds), 0)
+        logs = np.where(self.is_log, np.minimum(np.maximum(x, self.bounds[0]), self.bounds[1]), 0)
         found: FloatArray = np.where(self.is_log, np.exp(logs), x * self.scale)
-        return np.asarray(np.clip(found, self.limits[0], self.limits[1]))
+        return np.asarray(np.minimum(np.maximum(found, self.limits[0]), self.limits[1]))
 
     def slope(self, x: FloatArray) -> FloatArray:
         """Return the derivatives of the free values by their coordinates."""
@@ -214,6 +238,11 @@ class ParameterVector:
         return np.array([one.std is not None for one in self.fitted], bool)
 
     @cached_property
+    def _std(self) -> FloatArray:
+        """Standard deviations of the priors of the free ones, inf without one."""
+        return np.array([one.std or np.inf for one in self.fitted])
+
+    @cached_property
     def _shared(self) -> FloatArray:
         """Coordinates of members less that of their mean, over their standard deviation, as a matrix."""
         rows, place = [], {int(i): at for at, i in enumerate(self.free)}
@@ -225,15 +254,33 @@ class ParameterVector:
                 rows.append(row)
         return np.array(rows).reshape(-1, self.free.size)
 
+    @cached_property
+    def _dampers(self) -> tuple[NDArray[np.intp], NDArray[np.intp], list[int]]:
+        """Places, among the free ones, of hysteretic dampings; of their stiffnesses, -1 if fixed; and among all."""
+        place = {int(i): at for at, i in enumerate(self.free)}
+        own = [(at, one.damps) for at, one in enumerate(self.fitted) if one.damps is not None]
+        of = [place.get(damps, -1) for _, damps in own if damps is not None]
+        return np.array([at for at, _ in own], np.intp), np.array(of, np.intp), [k for _, k in own if k is not None]
+
     def pulls(self, x: FloatArray) -> FloatArray:
         """Return by how many standard deviations of its prior each free value is off, 0 without one; then members."""
-        std = np.array([one.std or np.inf for one in self.fitted])
-        return np.concatenate([(self._own(x) - self.values[self.free]) / std, self._shared @ x])
+        own = self._own(x)
+        found = (own - self.values[self.free]) / self._std
+        at, _, places = self._dampers
+        if at.size:
+            found[at] = own[at] / np.maximum(self.to_values(x)[places], TINY) / _LARGEST_LOSS
+        return np.concatenate([found, self._shared @ x])
 
     def pull_slopes(self, x: FloatArray) -> FloatArray:
         """Return their derivatives by the coordinates, a row each."""
-        std = np.array([one.std or np.inf for one in self.fitted])
-        return np.concatenate([np.diag(self.slope(x) / std), self._shared])
+        slope = self.slope(x)
+        found = np.diag(slope / self._std)
+        at, of, places = self._dampers
+        stiffness = np.maximum(self.to_values(x)[places], TINY)
+        found[at, at] = slope[at] / stiffness / _LARGEST_LOSS
+        free = of >= 0
+        found[at[free], of[free]] = -(self._own(x)[at] / stiffness**2 / _LARGEST_LOSS)[free] * slope[of[free]]
+        return np.concatenate([found, self._shared])
 
     def prior_information(self, x: FloatArray) -> FloatArray:
         """Return the information of all priors on the coordinates, shape (p, p)."""
@@ -242,7 +289,14 @@ class ParameterVector:
 
     def places_of(self, origin: ParameterOrigin) -> list[int]:
         """Return the places, among all, of the parameters of an origin."""
-        return [i for i, one in enumerate(self.all) if one.origin == origin]
+        return self._places.get(origin, [])
+
+    @cached_property
+    def _places(self) -> dict[ParameterOrigin, list[int]]:
+        found: dict[ParameterOrigin, list[int]] = {}
+        for i, one in enumerate(self.all):
+            found.setdefault(one.origin, []).append(i)
+        return found
 
     def of_joint(self) -> ParameterVector:
         """Return the same with the parameters of the joint free only."""
@@ -266,6 +320,23 @@ class ParameterVector:
     def places_of_part(self, name: str, origin: ParameterOrigin = "part") -> list[int]:
         """Return the places, among all, of the unknowns or the errors of a part."""
         return [i for i in self.places_of(origin) if self.all[i].place[0] == name]
+
+
+def with_dampers(parameters: Sequence[FitParameter], joint: LawJoint) -> list[FitParameter]:
+    """Return parameters of a joint whose springs supply no energy: damping of one DOF is at least 0.
+
+    Hysteretic damping has a prior relative to the stiffness: FRFs far from a joint hardly tell a loss factor above 1.
+    """
+    found, at = list(parameters), {one.name: i for i, one in enumerate(parameters)}
+    for i, one in enumerate(joint.quantities):
+        name, own = one.field.name, found[i]
+        if one.field not in SpringLaw.parameters[1:] or "," in one.name or one.value < 0:
+            continue
+        point, _, own_name = one.name.rpartition(f"{name}_")
+        stiffness = at[f"{point}k_{own_name}"]
+        size = _FIRST_LOSS * (parameters[stiffness].value or 1.0) / (1.0 if name == "h" else _FIRST_OMEGA)
+        found[i] = own._replace(lower=0.0, size=size, damps=stiffness if name == "h" else None)
+    return found
 
 
 def joint_vector(joint: LawJoint, fixed: Sequence[str], joint_stiffness: FloatArray) -> ParameterVector:

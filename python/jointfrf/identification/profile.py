@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from jointfrf.identification.minimise import Linearised, Minimum, Squares, minimise
+from jointfrf.identification.minimise import Minimum, NormalEquations, Squares, inverse_information, minimise
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["FunctionIntervals", "Intervals", "ProfileIntervals", "ProfiledCoordinates"]
@@ -47,6 +47,14 @@ class ProfiledCoordinates(Protocol):
 
     def longest_reach(self, i: int) -> float:
         """Return how far from the minimum a limit is sought first at most."""
+
+
+class _ProfilePoint(NamedTuple):
+    """Point of a profile: the distance of its parameter from the minimum, coordinates, their change with that."""
+
+    reach: float
+    x: FloatArray
+    along: FloatArray
 
 
 class ProfileIntervals:
@@ -104,19 +112,17 @@ class ProfileIntervals:
         own = float(self.covariance[i, i])
         if not (np.isfinite(own) and own > 0):
             return end
-        along, variance = self.covariance[:, i] / own, own / self.squares.unit
+        along, variance = self._followed(i, self.covariance / self.squares.unit)
         reach = min(float(np.sqrt(limit * variance)), self.coordinates.longest_reach(i))
-        low, high = 0.0, np.inf
-        minimised: FloatArray | None = None  # the way to a minimum with the parameter held, for a change of it of 1
+        low, high, unsure = 0.0, np.inf, np.inf
+        below, above = 0.0, np.inf  # roots of the excess there, over that of the limit
+        points = [_ProfilePoint(0.0, self.x, sign * along)]
         quadratic = reach**2 / variance
         for step in range(self.steps):
             at_bound = sign * (self.x[i] + sign * reach - bound) >= 0
             if at_bound:
                 reach = sign * (bound - self.x[i])
-            there = self._there(sign * reach * along)
-            excess = self._excess(self.squares.cost(there))
-            if minimised is not None and self._excess(self.squares.cost(self._there(reach * minimised))) < excess:
-                there = self._there(reach * minimised)
+            there, excess = self._predicted(points, reach, i, sign)
             if step == 0 and abs(excess / quadratic - 1) < self.parabola:
                 return self._value(i, sign * reach * np.sqrt(limit / excess))
             if excess > _FAR_BELOW * limit:
@@ -126,23 +132,61 @@ class ProfileIntervals:
                 excess = self._excess(self.least(there, i))
             elif excess > _FAR_BELOW * limit:
                 found = self._minimised(there, i)
-                excess, minimised = self._excess(found.cost), (found.x - self.x) / reach
+                excess = self._excess(found.cost)
+                if excess > limit and self._excess(found.cost - 2 * found.promised) < limit:
+                    # The squares may still come below the limit here: from nearer they are minimised sooner.
+                    unsure, reach = reach, (low + reach) / 2
+                    continue
+                if np.isfinite(found.information).all():
+                    nearby = self._followed(i, inverse_information(found.information / self.squares.unit))[0]
+                    points.append(_ProfilePoint(reach, found.x, sign * nearby))
             # Beyond a parameter that cannot be negative squares rise like a wall.
             if abs(excess / limit - 1) < self.near or high - low < _WALL * self.near * reach:
                 break
             if excess < limit:
                 if at_bound:
                     return end
-                low = reach
+                low, below = reach, float(np.sqrt(excess / limit))
             else:
-                high = reach
-            # By the parabola from the last point, inside what is known.
-            guess = reach * float(np.sqrt(limit / max(excess, 1e-6 * limit)))
-            reach = min(guess, 4 * reach) if high == np.inf else float(np.clip(guess, *(low + (high - low) * _INSIDE)))
+                high, above = reach, float(np.sqrt(excess / limit))
+            if high == np.inf:  # by the parabola from the last point
+                reach = min(reach / max(below, 1e-3), 4 * reach, unsure)
+            else:  # by the chord of the root of the excess
+                reach = low + (high - low) * float(np.clip((1 - below) / (above - below), *_INSIDE))
         else:
-            if high == np.inf:
+            if min(high, unsure) == np.inf:
                 return end
         return self._value(i, sign * reach)
+
+    def _followed(self, i: int, covariance: FloatArray) -> tuple[FloatArray, float]:
+        """Return the change of all coordinates for a change of number i by 1, and the variance of number i.
+
+        Coordinates that the squares hardly determine stay: derivatives say nothing about places that are so far off.
+        """
+        longest = np.array([self.coordinates.longest_reach(j) for j in range(self.x.size)])
+        follows = (np.diagonal(covariance) <= longest**2) | (np.arange(self.x.size) == i)
+        found = covariance[np.ix_(follows, follows)]
+        if not follows.all():
+            shared = covariance[np.ix_(follows, ~follows)]
+            found = found - shared @ np.linalg.pinv(covariance[np.ix_(~follows, ~follows)]) @ shared.T
+        at, along = int(follows[:i].sum()), np.zeros(self.x.size)
+        along[follows] = found[:, at] / found[at, at]
+        return along, float(found[at, at])
+
+    def _predicted(self, points: Sequence[_ProfilePoint], reach: float, i: int, sign: int) -> tuple[FloatArray, float]:
+        """Return coordinates at a reach, by the tangent or the chord of the profile that is lower, and their excess."""
+        below = max((one for one in points if one.reach <= reach), key=lambda one: one.reach)
+        above = min((one for one in points if one.reach > reach), key=lambda one: one.reach, default=None)
+        starts = [one.x + (reach - one.reach) * one.along for one in (below, above) if one is not None]
+        if above is not None:
+            starts.append(below.x + (above.x - below.x) * (reach - below.reach) / (above.reach - below.reach))
+        found = []
+        for start in starts:
+            start[i] = self.x[i] + sign * reach
+            there = np.clip(start, *self.squares.bounds)
+            found.append((self._excess(self.squares.cost(there)), there))
+        excess, there = min(found, key=lambda one: one[0])
+        return there, excess
 
     def of_function(self, function: Callable[[FloatArray], float], probability: float) -> tuple[float, float] | None:
         """Return the interval of a function of the coordinates: the squares are minimised with the function held.
@@ -220,7 +264,7 @@ class _HeldFunction:
         """Return the sum of the squares."""
         return self.squares.cost(x) + self.weight * (self.function(x) - self.value) ** 2
 
-    def linearised(self, x: FloatArray) -> Linearised:
+    def linearised(self, x: FloatArray) -> NormalEquations:
         """Return it with its derivatives; the function's by differences."""
         at = self.squares.linearised(x)
         if not np.isfinite(at.cost):
@@ -229,7 +273,7 @@ class _HeldFunction:
         ends = [(self.function(x + step), self.function(x - step)) for step in steps * np.eye(x.size)]
         slope = np.array([one - other for one, other in ends]) / (2 * steps)
         apart = self.value - self.function(x)
-        return Linearised(
+        return NormalEquations(
             at.cost + self.weight * apart**2,
             at.information + self.weight * np.outer(slope, slope),
             at.gradient + self.weight * apart * slope,

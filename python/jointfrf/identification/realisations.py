@@ -20,6 +20,7 @@ from jointfrf.identification.manifold.prepare import (
     as_equal_points,
     prepare_compliance,
 )
+from jointfrf.identification.manifold.uncertainty import joint_intervals
 from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import BandsOfDofs, as_measured
 from jointfrf.identification.result import Fit
@@ -226,7 +227,9 @@ def viscous_estimate(
         As `identify`.
     """
     problem, found, _ = estimated_joint(_viscous_problem(freq_hz, gamma, dofs, start))
-    return found.theta, np.array(list(uncertainty_of(problem, found).intervals(0.95).values())).T
+    return found.theta, np.array(
+        list(joint_intervals(found, uncertainty_of(problem, found)[0].factor)(0.95).values())
+    ).T
 
 
 def _viscous_problem(

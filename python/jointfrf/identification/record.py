@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+import re
 import reprlib
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, fields
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+import msgspec
 import numpy as np
+from msgspec import UNSET, Struct, UnsetType
 
 from jointfrf.dofs import Parameter
 from jointfrf.errors import FileContentError
@@ -22,18 +25,91 @@ from jointfrf.kernel.call import VERSION
 from jointfrf.laws.joint_toml import joint_text, read_joint_table
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.messages.finding import Finding, saved_finding
-from jointfrf.messages.message import Severity
 from jointfrf.toml.table import TomlTable
 
 __all__ = ["fit_from_dict", "fit_to_dict", "load", "read_record", "save"]
 
-#: What the first keys of a file say. Version 1 had springs alone.
+#: Format and version in the first keys of a file. Version 1 had springs alone.
 _FORMAT, _VERSION = "jointfrf joint", 2
 #: Probabilities of the intervals that are kept: the quartiles, one standard deviation, and what is usually quoted.
 _PROBABILITIES = (0.5, 0.6827, 0.9, 0.95, 0.99)
 #: Bytes of memory of a frequency line.
 _LINE = 32
-_INFINITE = {"inf": np.inf, "-inf": -np.inf}
+#: Keys that a file of version 1 does not have.
+_OF_VERSION_2 = ("joint", "derived", "responses", "forces", "residual_is_noise", "is_converged", "findings")
+
+#: JSON has neither NaN (null) nor infinity (a text).
+Number = float | Literal["inf", "-inf"] | None
+Pair = tuple[Number, Number]
+
+
+class _ParameterRecord(Struct):
+    value: Number
+    unit: str = ""
+    std_error: Number = None
+    confidence_interval_95: Pair = (None, None)
+    kind: str = ""
+    between: tuple[str, str] = ("", "")
+    origin: str = ""
+    prior: Pair | None = None
+
+
+class _DerivedRecord(Struct):
+    value: Number
+    unit: str
+    std_error: Number
+    confidence_interval_95: Pair
+
+
+class _SeenRecord(Struct):
+    value: Number
+    low: Number
+    high: Number
+    sides: Number
+    inertia: Number
+    noise: Number
+
+
+class _Grid(Struct):
+    first: float
+    last: float
+    number: int
+
+
+class _Complex(Struct):
+    real: list[Number]
+    imag: list[Number]
+
+
+class _Record(Struct, kw_only=True):
+    """The file, key by key."""
+
+    format: str
+    format_version: int
+    written_by: str = ""
+    method: str
+    dofs: tuple[str, ...]
+    parameters: dict[str, _ParameterRecord]
+    joint: dict[str, Any] | None
+    same: tuple[tuple[str, ...], ...] | None = ()
+    covariance: list[list[Number]]
+    intervals: dict[str, dict[str, Pair]] | None
+    derived: dict[str, _DerivedRecord] | None
+    seen: dict[str, _SeenRecord] | None = msgspec.field(default_factory=dict)
+    noise_level: Number
+    residual_level: Number
+    residual_is_noise: bool | None
+    responses: tuple[str, ...] | None
+    forces: tuple[str, ...] | None
+    is_converged: bool | None
+    frequency_hz: tuple[float, float] | UnsetType = UNSET
+    n_lines: int | UnsetType = UNSET
+    lines_hz: list[float] | _Grid
+    bands_hz: dict[str, tuple[tuple[float, float], ...]]
+    findings: list[dict[str, Any]] | None
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+    k_lines: _Complex | UnsetType | None = UNSET
 
 
 class _KnownIntervals:
@@ -86,85 +162,79 @@ def fit_to_dict(fit: Fit, *, probabilities: Sequence[float] | None = None, lines
     """
     check_type("fit", fit, Fit)
     intervals, errors = fit.confidence_interval(0.95), fit.std_error
-    content = {
-        "format": _FORMAT,
-        "format_version": _VERSION,
-        "written_by": f"jointfrf {VERSION}",
-        "method": fit.method,
-        "dofs": list(fit.dofs),
-        "parameters": {
-            one.name: {
-                "value": _plain(fit.value[one.name]),
-                "unit": one.unit,
-                "std_error": _finite(errors[one.name]) if np.isfinite(intervals[one.name]).all() else None,
-                "confidence_interval_95": [_finite(limit) for limit in intervals[one.name]],
-                "kind": one.kind,
-                "between": [one.row, one.column],
-                "origin": one.origin,
-                "prior": None if one.prior is None else list(one.prior),
-            }
+    record = _Record(
+        format=_FORMAT,
+        format_version=_VERSION,
+        written_by=f"jointfrf {VERSION}",
+        method=fit.method,
+        dofs=fit.dofs,
+        parameters={
+            one.name: _ParameterRecord(
+                _plain(fit.value[one.name]),
+                one.unit,
+                _finite(errors[one.name]) if np.isfinite(intervals[one.name]).all() else None,
+                (_finite(intervals[one.name][0]), _finite(intervals[one.name][1])),
+                one.kind,
+                (one.row, one.column),
+                one.origin,
+                one.prior,
+            )
             for one in fit.parameters
         },
-        "joint": None if fit.laws is None else tomllib.loads(joint_text(fit.laws)),
-        "same": [list(one) for one in fit.same],
-        "covariance": [[_plain(value) for value in row] for row in fit.covariance.tolist()],
-        "intervals": _plain_intervals(fit, probabilities),
-        "derived": {
-            name: {
-                "value": _plain(one.value),
-                "unit": "1",
-                "std_error": _plain(one.std_error),
-                "confidence_interval_95": [_plain(one.low), _plain(one.high)],
-            }
+        joint=None if fit.laws is None else tomllib.loads(joint_text(fit.laws)),
+        same=fit.same,
+        covariance=[[_plain(value) for value in row] for row in fit.covariance.tolist()],
+        intervals=_plain_intervals(fit, probabilities),
+        derived={
+            name: _DerivedRecord(_plain(one.value), "1", _plain(one.std_error), (_plain(one.low), _plain(one.high)))
             for name, one in fit.loss_factors.items()
         },
-        "seen": {name: {key: _plain(value) for key, value in asdict(one).items()} for name, one in fit.seen.items()},
-        "noise_level": _plain(fit.noise_level),
-        "residual_level": _plain(fit.residual_level),
-        "residual_is_noise": fit.residual_is_noise,
-        "responses": list(fit.responses),
-        "forces": list(fit.forces),
-        "is_converged": fit.is_converged,
-        "frequency_hz": [float(fit.freq_hz.min()), float(fit.freq_hz.max())],
-        "n_lines": int(fit.freq_hz.size),
-        "lines_hz": _plain_lines(fit.freq_hz),
-        "bands_hz": {d: [list(b) for b in own] for d, own in zip(fit.dofs, fit.bands, strict=False)},
+        seen={
+            name: _SeenRecord(*(_plain(getattr(one, key)) for key in _SeenRecord.__struct_fields__))
+            for name, one in fit.seen.items()
+        },
+        noise_level=_plain(fit.noise_level),
+        residual_level=_plain(fit.residual_level),
+        residual_is_noise=fit.residual_is_noise,
+        responses=fit.responses,
+        forces=fit.forces,
+        is_converged=fit.is_converged,
+        frequency_hz=(float(fit.freq_hz.min()), float(fit.freq_hz.max())),
+        n_lines=int(fit.freq_hz.size),
+        lines_hz=_plain_lines(fit.freq_hz),
+        bands_hz=dict(zip(fit.dofs, fit.bands, strict=False)),
+        warnings=fit.warnings,
+        notes=fit.notes,
+        k_lines=_plain_complex(fit.k_lines) if lines and fit.k_lines is not None else UNSET,
         **fit.content(),
-        "warnings": list(fit.warnings),
-        "notes": list(fit.notes),
-    }
-    if lines and fit.k_lines is not None:
-        content["k_lines"] = {
-            part: [_plain(value) for value in values.ravel().tolist()]
-            for part, values in (("real", fit.k_lines.real), ("imag", fit.k_lines.imag))
-        }
-    return content
+    )
+    found: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(record))
+    return found
 
 
 def _finite(number: float) -> float | None:
     return float(number) if np.isfinite(number) else None
 
 
-def _plain(number: float) -> float | str | None:
-    """Write a number for JSON, which has neither NaN (null) nor infinity (a text)."""
+def _plain(number: float) -> Number:
+    """Return a number for JSON."""
     if np.isinf(number):
         return "inf" if number > 0 else "-inf"
     return _finite(number)
 
 
-def _number(value: object) -> float:
-    """Read what `_plain` wrote."""
-    if value is None:
-        return float("nan")
-    if isinstance(value, str):
-        return _INFINITE[value]
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise TypeError
-    return float(value)
+def _plain_complex(values: ComplexArray) -> _Complex:
+    real, imag = ([_plain(one) for one in part.ravel().tolist()] for part in (values.real, values.imag))
+    return _Complex(real, imag)
 
 
-def _plain_intervals(fit: Fit, probabilities: Sequence[float] | None) -> dict[str, Any] | None:
-    """Write the intervals of a method that has its own: those of others follow from the covariance."""
+def _number(value: Number) -> float:
+    """Return the number that `_plain` wrote."""
+    return float("nan" if value is None else value)
+
+
+def _plain_intervals(fit: Fit, probabilities: Sequence[float] | None) -> dict[str, dict[str, Pair]] | None:
+    """Return the intervals of a method that has its own; others follow from the covariance."""
     if fit.intervals is None:
         return None
     if isinstance(fit.intervals, _KnownIntervals) and probabilities is None:
@@ -173,17 +243,17 @@ def _plain_intervals(fit: Fit, probabilities: Sequence[float] | None) -> dict[st
         levels = sorted({*_PROBABILITIES, *as_real("probabilities", probabilities or (), (None,)).tolist()})
     return {
         repr(float(level)): {
-            name: [_plain(limit) for limit in limits] for name, limits in fit.confidence_interval(level).items()
+            name: (_plain(low), _plain(high)) for name, (low, high) in fit.confidence_interval(level).items()
         }
         for level in levels
     }
 
 
-def _plain_lines(freq_hz: FloatArray) -> list[float] | dict[str, float]:
-    """Write frequency lines by their ends and number where that gives the same numbers."""
+def _plain_lines(freq_hz: FloatArray) -> list[float] | _Grid:
+    """Return frequency lines by their ends and number if that gives the same numbers."""
     first, last, number = float(freq_hz[0]), float(freq_hz[-1]), freq_hz.size
     if number > 2 and np.array_equal(np.linspace(first, last, number), freq_hz):
-        return {"first": first, "last": last, "number": number}
+        return _Grid(first, last, number)
     return [float(value) for value in freq_hz.tolist()]
 
 
@@ -287,13 +357,13 @@ def read_record(path: Path) -> tuple[Fit, dict[str, Any]]:
         check_file(path)
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError):
+    except (ValueError, RecursionError):  # ValueError: no JSON, no UTF-8, or a number of thousands of digits
         raise FileContentError(f"{path} is no file of a joint: it is not JSON, as `save` writes it") from None
     return _fit_of(content, str(path)), content
 
 
 def _fit_of(content: object, source: str) -> Fit:
-    """Read a fit; `source` is what holds it, for messages, which name the key that is missing or damaged."""
+    """Read a fit; messages name `source` and the key that is missing or damaged."""
     if not isinstance(content, dict) or content.get("format") != _FORMAT:
         raise FileContentError(f'{source} holds no fit of a joint: its "format" is not "{_FORMAT}"')
     version = content.get("format_version")
@@ -305,224 +375,189 @@ def _fit_of(content: object, source: str) -> Fit:
             f"{source} is of format version {version}, written by {writer}; this is jointfrf {VERSION}, which reads "
             f"versions up to {_VERSION}: install a newer one"
         )
-    read: dict[str, Any] = {}
-    for key, (reader, is_new) in _READERS.items():
-        if key not in content and key not in ("k_lines", "seen", "same") and not (is_new and version == 1):
-            raise FileContentError(f'{source}: "{key}" is missing')
-        try:
-            read[key] = reader(content.get(key), read)
-        except FileContentError as error:
-            raise FileContentError(f"{source}: {error}") from None
-        except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError):
-            raise FileContentError(f'{source}: "{key}" is damaged') from None
-    parameters, values = read["parameters"]
+    older = dict.fromkeys(_OF_VERSION_2) if version < _VERSION else {}
+    try:
+        record = msgspec.convert({**older, **content}, _Record)
+    except msgspec.ValidationError as error:
+        raise FileContentError(f"{source}: {_said(str(error))}") from None
+    with _named_key(source) as at:
+        return _fit_of_record(record, at)
+
+
+def _said(error: str) -> str:
+    """Return which key is missing or damaged."""
+    if missing := re.fullmatch(r"Object missing required field `(\w+)`", error):
+        return f'"{missing[1]}" is missing'
+    path = re.search(r"`\$\.(\w+)", error)
+    return f'"{path[1] if path else "format"}" is damaged'
+
+
+@contextmanager
+def _named_key(source: str) -> Iterator[list[str]]:
+    """Turn what goes wrong into an error that names the last key of the list, which the block fills."""
+    at = ["format"]
+    try:
+        yield at
+    except FileContentError as error:
+        raise FileContentError(f"{source}: {error}") from None
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError):
+        raise FileContentError(f'{source}: "{at[-1]}" is damaged') from None
+
+
+def _fit_of_record(record: _Record, at: list[str]) -> Fit:
+    """Return the fit; each key is noted in `at` before it is read."""
+    made: dict[str, Any] = {}
+    for key, name, reader in _READERS:
+        at.append(key)
+        made[name] = reader(record, made)
+    loss_factors = made.pop("loss_factors")
     fit = Fit(
-        method=read["method"],
-        dofs=read["dofs"],
-        parameters=parameters,
-        estimate=values,
-        covariance=read["covariance"],
-        noise_level=read["noise_level"],
-        residual_level=read["residual_level"],
-        freq_hz=read["lines_hz"],
-        laws=read["joint"],
-        same=read["same"],
-        findings=read["findings"] if version > 1 else (*read["warnings"], *read["notes"]),
-        k_lines=read["k_lines"],
-        bands=read["bands_hz"],
-        responses=read["responses"],
-        forces=read["forces"],
-        residual_is_noise=read["residual_is_noise"],
-        is_converged=read["is_converged"] is not False,
-        seen=read["seen"],
-        intervals=read["intervals"],
+        method=record.method,
+        noise_level=_number(record.noise_level),
+        residual_level=_number(record.residual_level),
+        responses=record.responses or (),
+        forces=record.forces or (),
+        residual_is_noise=record.residual_is_noise,
+        is_converged=record.is_converged is not False,
+        **made,
     )
-    if version > 1:
+    if record.format_version > 1:
         # A profile of the likelihood cannot be found again.
-        vars(fit)["loss_factors"] = read["derived"]
+        vars(fit)["loss_factors"] = loss_factors
     return fit
 
 
-def _parameters_of(content: Any, read: dict[str, Any]) -> tuple[tuple[FittedParameter, ...], FloatArray]:
-    values = np.array([_number(entry["value"]) for entry in content.values()])
-    if all("kind" not in entry for entry in content.values()):
-        terms = [Parameter.parse(name) for name in content]
+def _dofs_of(record: _Record, _: dict[str, Any]) -> tuple[str, ...]:
+    if not record.dofs or len(set(record.dofs)) != len(record.dofs):
+        raise ValueError
+    return record.dofs
+
+
+def _parameters_of(record: _Record, _: dict[str, Any]) -> tuple[FittedParameter, ...]:
+    own = record.parameters
+    if all(not one.origin for one in own.values()):  # springs of version 1
+        terms = [Parameter.parse(name) for name in own]
         parameters = tuple(FittedParameter(one.name, one.unit, one.kind, one.row, one.column) for one in terms)
     else:
-        parameters = tuple(_parameter_of(name, own, read) for name, own in content.items())
+        parameters = tuple(
+            FittedParameter(name, one.unit, one.kind, *one.between, one.origin, one.prior and _pair(one.prior))
+            for name, one in own.items()
+        )
     ends = {dof for one in parameters if one.origin == "joint" for dof in (one.row, one.column)}
-    if not parameters or not ends <= set(read["dofs"]):
+    if not parameters or not ends <= set(record.dofs):
         raise ValueError
-    return parameters, values
+    return parameters
 
 
-def _parameter_of(name: str, content: Any, read: dict[str, Any]) -> FittedParameter:
-    row, column = _texts_of(content["between"], read)
-    unit, kind, origin = (_text_of(content[key], read) for key in ("unit", "kind", "origin"))
-    prior = None if content["prior"] is None else _pair_of(content["prior"])
-    return FittedParameter(name, unit, kind, row, column, origin, prior)
+def _pair(pair: Pair) -> tuple[float, float]:
+    return _number(pair[0]), _number(pair[1])
 
 
-def _pair_of(content: Any) -> tuple[float, float]:
-    first, second = (_number(value) for value in content)
-    return first, second
+def _values_of(record: _Record, _: dict[str, Any]) -> FloatArray:
+    return np.array([_number(one.value) for one in record.parameters.values()])
 
 
-def _joint_of(content: Any, _: dict[str, Any]) -> LawJoint | None:
-    if content is None:
+def _covariance_of(record: _Record, _: dict[str, Any]) -> FloatArray:
+    p = len(record.parameters)
+    return np.array([[_number(value) for value in row] for row in record.covariance], np.float64).reshape(p, p)
+
+
+def _joint_of(record: _Record, _: dict[str, Any]) -> LawJoint | None:
+    if record.joint is None:
         return None
-    found = read_joint_table(TomlTable(content, "joint"))
+    found = read_joint_table(TomlTable(record.joint, "joint"))
     if not isinstance(found, LawJoint):
         raise TypeError
     return found
 
 
-def _text_of(content: Any, _: dict[str, Any]) -> str:
-    if not isinstance(content, str):
-        raise TypeError
-    return content
-
-
-def _texts_of(content: Any, _: dict[str, Any]) -> tuple[str, ...]:
-    if not isinstance(content, list) or not all(isinstance(text, str) for text in content):
-        raise TypeError
-    return tuple(content)
-
-
-def _channels_of(content: Any, read: dict[str, Any]) -> tuple[str, ...]:
-    return () if content is None else _texts_of(content, read)
-
-
-def _dofs_of(content: Any, read: dict[str, Any]) -> tuple[str, ...]:
-    dofs = _texts_of(content, read)
-    if not dofs or len(set(dofs)) != len(dofs):
-        raise ValueError
-    return dofs
-
-
-def _number_of(content: Any, _: dict[str, Any]) -> float:
-    return _number(content)
-
-
-def _truth_of(content: Any, _: dict[str, Any]) -> bool | None:
-    if not isinstance(content, bool | None):
-        raise TypeError
-    return content
-
-
-def _covariance_of(content: Any, read: dict[str, Any]) -> FloatArray:
-    p = len(read["parameters"][0])
-    return np.array([[_number(value) for value in row] for row in content], np.float64).reshape(p, p)
-
-
-def _lines_of(content: Any, _: dict[str, Any]) -> FloatArray:
-    if isinstance(content, dict):
-        number = int(content["number"])
-        check_stated(f'"lines_hz" of {number} lines', _LINE * number)
-        freq = np.linspace(_number(content["first"]), _number(content["last"]), number)
+def _lines_of(record: _Record, _: dict[str, Any]) -> FloatArray:
+    own = record.lines_hz
+    if isinstance(own, _Grid):
+        check_stated(f'"lines_hz" of {own.number} lines', _LINE * own.number)
+        freq = np.linspace(own.first, own.last, own.number)
     else:
-        freq = np.array([_number(value) for value in content], np.float64)
+        freq = np.array(own, np.float64)
     if freq.size == 0 or not np.isfinite(freq).all():
         raise ValueError
     return freq
 
 
-def _k_lines_of(content: Any, read: dict[str, Any]) -> ComplexArray | None:
-    if content is None:
+def _k_lines_of(record: _Record, made: dict[str, Any]) -> ComplexArray | None:
+    if not isinstance(record.k_lines, _Complex):
         return None
-    shape = (read["lines_hz"].size, len(read["dofs"]), len(read["dofs"]))
-    k_lines = np.empty(shape, np.complex128)
+    k_lines = np.empty((made["freq_hz"].size, len(record.dofs), len(record.dofs)), np.complex128)
     for part in ("real", "imag"):
-        setattr(k_lines, part, np.array([_number(value) for value in content[part]], np.float64).reshape(shape))
+        values = [_number(value) for value in getattr(record.k_lines, part)]
+        setattr(k_lines, part, np.array(values, np.float64).reshape(k_lines.shape))
     return k_lines
 
 
-def _bands_of(content: Any, read: dict[str, Any]) -> tuple[tuple[tuple[float, float], ...], ...]:
-    if content == {}:
-        return ()
-    return tuple(tuple((_number(low), _number(high)) for low, high in content[dof]) for dof in read["dofs"])
+def _bands_of(record: _Record, _: dict[str, Any]) -> tuple[tuple[tuple[float, float], ...], ...]:
+    return tuple(record.bands_hz[dof] for dof in record.dofs) if record.bands_hz else ()
 
 
-def _intervals_of(content: Any, read: dict[str, Any]) -> _KnownIntervals | None:
-    if content is None:
+def _intervals_of(record: _Record, _: dict[str, Any]) -> _KnownIntervals | None:
+    if record.intervals is None:
         return None
-    known = {}
-    for level, own in content.items():
-        known[float(level)] = {one.name: _pair_of(own[one.name]) for one in read["parameters"][0]}
+    known = {
+        float(level): {name: _pair(own[name]) for name in record.parameters} for level, own in record.intervals.items()
+    }
     if not any(np.isclose(level, 0.95, rtol=0, atol=1e-9) for level in known):
         raise ValueError
     return _KnownIntervals(known)
 
 
-def _derived_of(content: Any, _: dict[str, Any]) -> dict[str, Derived]:
-    if content is None:
-        return {}
+def _loss_factors_of(record: _Record, _: dict[str, Any]) -> dict[str, Derived]:
     return {
-        name: Derived(_number(own["value"]), _number(own["std_error"]), *_pair_of(own["confidence_interval_95"]))
-        for name, own in content.items()
+        name: Derived(_number(own.value), _number(own.std_error), *_pair(own.confidence_interval_95))
+        for name, own in (record.derived or {}).items()
     }
 
 
-def _same_of(content: Any, read: dict[str, Any]) -> tuple[tuple[str, ...], ...]:
-    """Read groups of equal joints; files of before have none."""
-    if content is None:
-        return ()
-    if not isinstance(content, list):
-        raise TypeError
-    groups = tuple(_texts_of(one, read) for one in content)
-    known = {dof.rpartition(".")[0] for dof in read["dofs"]}
+def _same_of(record: _Record, _: dict[str, Any]) -> tuple[tuple[str, ...], ...]:
+    groups, known = record.same or (), {dof.rpartition(".")[0] for dof in record.dofs}
     if not all(len(one) > 1 and known.issuperset(one) for one in groups):
         raise ValueError
     return groups
 
 
-def _seen_of(content: Any, _: dict[str, Any]) -> dict[str, SeenStiffness]:
-    """Read what virtual points see; files of before have none."""
+def _seen_of(record: _Record, _: dict[str, Any]) -> dict[str, SeenStiffness]:
     return {
-        name: SeenStiffness(**{one.name: _number(own[one.name]) for one in fields(SeenStiffness)})
-        for name, own in ({} if content is None else content).items()
+        name: SeenStiffness(*(_number(getattr(own, key)) for key in _SeenRecord.__struct_fields__))
+        for name, own in (record.seen or {}).items()
     }
 
 
-def _findings_of(content: Any, read: dict[str, Any]) -> tuple[Finding, ...]:
-    return tuple(saved_finding(own, lambda text: _text_of(text, read)) for own in content or ())
-
-
-def _warnings_of(content: Any, read: dict[str, Any]) -> tuple[Finding, ...]:
-    return _without_numbers(content, "warning", read)
-
-
-def _notes_of(content: Any, read: dict[str, Any]) -> tuple[Finding, ...]:
-    return _without_numbers(content, "note", read)
-
-
-def _without_numbers(content: Any, severity: Severity, read: dict[str, Any]) -> tuple[Finding, ...]:
-    """Return sentences of a file of version 0.1, which has no findings."""
-    own = ({"text": text, "severity": severity, "about": (), "bands": ()} for text in _texts_of(content, read))
+def _findings_of(record: _Record, _: dict[str, Any]) -> tuple[Finding, ...]:
+    if record.format_version > 1:
+        return tuple(saved_finding(own, _text) for own in record.findings or ())
+    # Version 0.1 wrote sentences alone.
+    severities = {"warning": record.warnings, "note": record.notes}
+    own = ({"text": text, "severity": severity, "about": (), "bands": ()}
+           for severity, texts in severities.items() for text in texts)  # fmt: skip
     return tuple(map(saved_finding, own))
 
 
-#: Keys in the order in which they are read, later ones need earlier ones: reader, and whether version 1 lacks the key.
-_READERS: dict[str, tuple[Callable[[Any, dict[str, Any]], Any], bool]] = {
-    "method": (_text_of, False),
-    "dofs": (_dofs_of, False),
-    "parameters": (_parameters_of, False),
-    "joint": (_joint_of, True),
-    "covariance": (_covariance_of, False),
-    "noise_level": (_number_of, False),
-    "residual_level": (_number_of, False),
-    "responses": (_channels_of, True),
-    "forces": (_channels_of, True),
-    "residual_is_noise": (_truth_of, True),
-    "is_converged": (_truth_of, True),
-    "lines_hz": (_lines_of, False),
-    "k_lines": (_k_lines_of, False),
-    "bands_hz": (_bands_of, False),
-    "derived": (_derived_of, True),
-    "seen": (_seen_of, True),
-    "same": (_same_of, True),
-    "findings": (_findings_of, True),
-    "warnings": (_warnings_of, False),
-    "notes": (_notes_of, False),
-    "intervals": (_intervals_of, False),
-}
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError
+    return value
+
+
+#: Key of the file, name in `Fit`, and how it is read; later ones may need earlier ones.
+_READERS = (
+    ("dofs", "dofs", _dofs_of),
+    ("parameters", "parameters", _parameters_of),
+    ("parameters", "estimate", _values_of),
+    ("covariance", "covariance", _covariance_of),
+    ("joint", "laws", _joint_of),
+    ("lines_hz", "freq_hz", _lines_of),
+    ("k_lines", "k_lines", _k_lines_of),
+    ("bands_hz", "bands", _bands_of),
+    ("derived", "loss_factors", _loss_factors_of),
+    ("seen", "seen", _seen_of),
+    ("same", "same", _same_of),
+    ("findings", "findings", _findings_of),
+    ("intervals", "intervals", _intervals_of),
+)

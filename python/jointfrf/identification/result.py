@@ -345,8 +345,9 @@ class Fit(WithFindings):
             terms = {(own[a], own[b]): law for (a, b), law in laws.laws.items() if a in own and b in own}
             rigid, mass = ([dof for dof in some if dof in own] for some in (laws.rigid, laws.mass))
             laws = LawJoint(
-                terms, [own[dof] for dof in rigid], {own[dof]: laws.mass[dof] for dof in mass}, tuple(own.values())
-            )
+                terms, [own[dof] for dof in rigid], {own[dof]: laws.mass[dof] for dof in mass}, tuple(own.values()),
+                {own[dof]: unit for dof, unit in laws.per.items() if dof in own},
+            )  # fmt: skip
         found = replace(
             self,
             dofs=tuple(own.values()),

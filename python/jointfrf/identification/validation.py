@@ -43,6 +43,9 @@ class Validation:
     amplitude_error, frequency_error : ndarray, shape (m_r, m_f)
         Of the largest peak in the band, sought between the lines, percent (4.11), (4.12). The second is NaN where the
         measured FRF has no peak in the band: it is largest on the first or last line.
+    other_mode : ndarray of bool, shape (m_r, m_f)
+        Where the largest peak of the regenerated FRF is another mode: it has a nearer peak, and falls below the
+        half-power level between both. The frequency error then compares two modes.
     difference : ndarray, shape (m_r, m_f)
         Root mean square over the band of regenerated less measured, over that of the measured, percent: 100 where the
         regenerated FRF is as good as none.
@@ -55,6 +58,7 @@ class Validation:
     forces: tuple[str, ...]
     amplitude_error: FloatArray
     frequency_error: FloatArray
+    other_mode: NDArray[np.bool_]
     difference: FloatArray
 
     @property
@@ -89,6 +93,13 @@ class Validation:
         at = tuple(int(i) for i in np.unravel_index(int(np.nanargmax(self.difference)), self.difference.shape))
         if np.isnan(self.frequency_error[self.is_measured]).any():
             yield "-: no peak, the measured FRF is largest on the first or the last line of the band"
+        if self.other_mode.any():
+            one = np.argwhere(self.other_mode)[np.argmax(self.frequency_error[self.other_mode])]
+            name = f"{self.responses[one[0]]} / {self.forces[one[1]]}"
+            yield (
+                f"in {int(self.other_mode.sum())} FRFs the largest peak is another mode than measured, first {name}: "
+                f"the frequency error of {self.frequency_error[tuple(one)]:.3g} % compares two modes"
+            )
         yield f"largest difference: {self.responses[at[0]]} / {self.forces[at[1]]}, {self.difference[at]:.3g} %"
 
     def to_dict(self) -> dict[str, Any]:
@@ -100,6 +111,7 @@ class Validation:
             "forces": list(self.forces),
             "unit": "percent",
             **self._numbers(),
+            "other_mode": self.other_mode,
             "median": {name: _of_finite(np.median, values) for name, values in self._numbers().items()},
             "largest": {name: _of_finite(np.max, values) for name, values in self._numbers().items()},
         }
@@ -223,11 +235,29 @@ def compare_frfs(
         raise ValueError("measured holds NaN or Inf on some lines: leave these lines out")
     size = np.sqrt((abs(own) ** 2).mean(axis=0))
     difference = 100 * np.sqrt((abs(made - own) ** 2).mean(axis=0)) / np.maximum(size, TINY)
-    errors = np.full((2, *missing.shape), np.nan)
+    errors, changed = np.full((2, *missing.shape), np.nan), np.zeros(missing.shape, bool)
     for i, j in zip(*np.nonzero(~missing), strict=True):
         if size[i, j] > 0:
             pair = own[:, i, j], made[:, i, j]
             errors[0, i, j] = amplitude_error(*pair, freq, refine=True)
             if has_peak(pair[0], freq, (freq.min(), freq.max())):
                 errors[1, i, j] = frequency_error(*pair, freq, refine=True)
-    return Validation(freq, own, made, tuple(rows), tuple(columns), errors[0], errors[1], difference)
+                changed[i, j] = _is_other_mode(*pair, freq)
+    return Validation(freq, own, made, tuple(rows), tuple(columns), errors[0], errors[1], changed, difference)
+
+
+def _is_other_mode(measured: ComplexArray, regenerated: ComplexArray, freq_hz: FloatArray) -> bool:
+    """Return whether the largest peak of a regenerated FRF is not its peak nearest to the largest measured one.
+
+    Peaks are of two modes if the FRF between them is below 1/sqrt(2) of the smaller one: the half-power level.
+    """
+    order = np.argsort(freq_hz, kind="stable")
+    size, freq = abs(regenerated[order]), freq_hz[order]
+    aim = freq[np.argmax(abs(measured[order]))]
+    inner = np.flatnonzero((size[1:-1] >= size[:-2]) & (size[1:-1] > size[2:])) + 1
+    largest = int(np.argmax(size))
+    for nearest in inner[abs(freq[inner] - aim) < abs(freq[largest] - aim)].tolist():
+        between = size[min(nearest, largest) : max(nearest, largest) + 1]
+        if between.min() < size[nearest] / np.sqrt(2):
+            return True
+    return False

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
 from jointfrf.io.file_format import FrfArrays, Reading
-from jointfrf.io.labels import channels_of_table, is_table
+from jointfrf.io.pyfbs_tables import channels_of_tables, is_table, rows_of_table
 from jointfrf.io.units import QUANTITIES, parse_frequency_unit, parse_unit
 from jointfrf.kernel.arguments import as_array, check_type
 from jointfrf.spelling import some_of
@@ -87,11 +87,15 @@ def frfs_of_arrays(
     reading = Reading.checked(quantity)
     coordinates: Mapping[int, NDArray[np.float64]] = {}
     if is_table(responses) or is_table(excitations):
-        responses, excitations, coordinates = channels_of_table(responses, excitations)
+        rows = rows_of_table("responses", responses, 1.0), rows_of_table("excitations", excitations, 1.0)
+        found = channels_of_tables(*rows)
+        if found.oblique:
+            raise ValueError(f"{found.oblique[0][0].where} does not point along an axis; use jointfrf.io.from_pyfbs")
+        responses, excitations, coordinates = found.responses, found.excitations, found.coordinates
     content = FrfArrays(freq_hz, h, axes, responses, excitations, "", unit, coherence, averages, coordinates)
-    found = as_frf_set(content, source, reading)
+    frfs = as_frf_set(content, source, reading)
     reading.warn()
-    return found
+    return frfs
 
 
 def as_frf_set(content: FrfArrays, where: str, reading: Reading) -> FrfSet:

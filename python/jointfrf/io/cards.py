@@ -5,40 +5,50 @@ from __future__ import annotations
 import reprlib
 import textwrap
 from collections.abc import Sequence
-from typing import Literal, NamedTuple, TypedDict, Unpack, get_args
+from typing import TypedDict, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.dofs import DIRECTIONS, direction_places, rigid_offset
+from jointfrf.io.card_link import (
+    COMMENT_MARKS,
+    NO_ARM,
+    ROUND_OFF,
+    CardFormat,
+    CardLink,
+    CardTable,
+    card_integer,
+    card_real,
+    dmig,
+    large_card,
+    upper_entries,
+)
+from jointfrf.io.other_cards import (
+    code_aster_cards,
+    code_aster_equation,
+    lsdyna_cards,
+    lsdyna_equation,
+    subdyn_cards,
+)
 from jointfrf.io.units import ModelUnits, UnitSystemName, model_units
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_nodes, as_real, check_choice
 from jointfrf.spelling import visible
 
 __all__ = ["CardFormat", "CardOptions", "card_integer", "card_real", "rigid_cards", "spring_cards", "table_cards"]
 
-CardFormat = Literal["abaqus", "calculix", "nastran", "ansys"]
-
-#: Largest number of a node, an element or a property: eight columns.
-_LARGEST = 99_999_999
-#: Columns of a large field of Nastran; digits after the point that every number keeps.
-_WIDE, _DIGITS = 16, 8
-#: How far from symmetric, relative to the largest entry, rounding may leave a matrix.
-_ROUND_OFF = 1e-10
-#: Arms shorter than this are rounding, m.
-_NO_ARM = 1e-9
 #: A rigid arm is not as long, m: where one comes out longer, mm were taken for m.
 _LONGEST_ARM = 10.0
 #: Nodes in a line of a set of Abaqus and CalculiX, which take sixteen; of a continuation of Nastran.
 _IN_A_LINE = 8
 #: How far, relative to their distance, rounding may put a point off the line between two nodes.
 _ON_LINE = 1e-9
-#: How lines of comment begin.
-_MARKS = {"abaqus": "**", "calculix": "**", "nastran": "$", "ansys": "!"}
 #: Terms of an equation in a line of Abaqus and CalculiX.
 _TERMS = 4
 #: DOFs of Ansys by their numbers.
 _ANSYS_DOFS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
+#: Programs whose input has no cards for nodes that follow others here.
+_WITHOUT_FACES = ("code_aster", "lsdyna", "subdyn")
 #: Characters of a line of comment: Nastran reads 72 columns.
 _COMMENT = 68
 
@@ -58,82 +68,7 @@ class CardOptions(TypedDict, total=False):
     comments: Sequence[str]
     connector: bool
     table_hz: ArrayLike | None
-
-
-class _Table(NamedTuple):
-    """Stiffness and viscous damping over frequency, shape (n_freq, 6, 6), all in units of the model."""
-
-    freq: FloatArray
-    stiffness: FloatArray
-    damping: FloatArray
-
-
-class _Link(NamedTuple):
-    """A joint in all six directions: stiffness, viscous and hysteretic damping, shape (6, 6), and its numbers.
-
-    `arms` (2, 3) lead from the nodes to the reference points of the joint on the two sides, m; `positions` (2, 3) are
-    those of the nodes, where they are known; all in the `units` of the model. `faces` are nodes that follow the two.
-    """
-
-    stiffness: FloatArray
-    damping: FloatArray
-    hysteretic: FloatArray
-    nodes: tuple[int, ...]
-    element: int
-    number: int
-    notes: tuple[str, ...]
-    arms: FloatArray
-    positions: FloatArray | None
-    units: ModelUnits
-    faces: tuple[tuple[int, ...], tuple[int, ...]] | None
-    table: _Table | None = None
-
-    @property
-    def matrices(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        return self.stiffness, self.damping, self.hysteretic
-
-    @property
-    def has_arms(self) -> bool:
-        return bool(self.arms.any())
-
-    @property
-    def has_one_point(self) -> bool:
-        """Whether both arms end at the same place."""
-        if self.positions is None:
-            return True
-        ends = self.positions + self.arms
-        return np.allclose(ends[0], ends[1], rtol=0, atol=_NO_ARM / self.units.length)
-
-    def both_sides(self, matrix: FloatArray) -> FloatArray:
-        """T^T [[K, -K], [-K, K]] T: the joint resists the difference of the motions of its two points, shape (12, 12).
-
-        T takes the motions of the nodes to those of the points that are rigidly connected to them.
-        """
-        whole = np.kron(np.array([[1.0, -1.0], [-1.0, 1.0]]), matrix)
-        if not self.has_arms:
-            return whole
-        turn = np.zeros((12, 12))
-        for side in range(2):
-            own = slice(6 * side, 6 * side + 6)
-            turn[own, own] = rigid_offset(DIRECTIONS, self.arms[side])
-        moved = turn.T @ whole @ turn
-        # What cancels but for rounding is nothing; diagonals of damping may be negative.
-        size = np.sqrt(abs(moved.diagonal()))
-        moved[abs(moved) < _ROUND_OFF * np.outer(size, size)] = 0
-        return np.asarray(moved + (moved.T - moved) / 2)
-
-    def calculix_dof(self, place: int) -> tuple[int, int]:
-        """Return node and DOF of one of twelve; rotations are displacements of the ROT NODEs."""
-        side, direction = divmod(place, 6)
-        if direction < 3:
-            return self.nodes[side], direction + 1
-        if len(self.nodes) < 4:
-            raise ValueError("calculix has rotations at ROT NODEs of rigid bodies only; name the two in rotation_nodes")
-        return self.nodes[2 + side], direction - 2
-
-    def comments(self, mark: str) -> list[str]:
-        """Write the notes as lines of comment."""
-        return [f"{mark} {note}" for note in self.notes]
+    damping_nodes: int | None
 
 
 def spring_cards(
@@ -147,8 +82,8 @@ def spring_cards(
 
     Parameters
     ----------
-    program : {"abaqus", "calculix", "nastran", "ansys"}
-        Whose input.
+    program : str
+        One of `CardFormat`.
     dofs : sequence of str
         Names of the n DOFs.
     matrices : tuple of three ndarray, shape (n, n)
@@ -178,8 +113,8 @@ def table_cards(
 
     Parameters
     ----------
-    program : {"abaqus", "nastran"}
-        The others have no such tables.
+    program : {"abaqus", "nastran", "code_aster"}
+        Other programs have no such tables.
     dofs : sequence of str
         Names of the n DOFs.
     freq_hz : ndarray, shape (n_freq,)
@@ -195,7 +130,7 @@ def table_cards(
         Lines of input.
     """
     check_choice("program", program, get_args(CardFormat))
-    if program not in ("abaqus", "nastran"):
+    if program not in ("abaqus", "nastran", "code_aster"):
         raise ValueError(f"{program} has no tables over frequency; name one frequency by freq_hz")
     if options.get("full_matrix", False):
         raise ValueError("full_matrix has no tables over frequency; leave one of them out")
@@ -214,12 +149,12 @@ def table_cards(
         f"tables of {freq_hz.size} lines, {freq_hz[0]:.6g} to {freq_hz[-1]:.6g} Hz: Re K* and Im K*/w, linear between "
         "lines; for direct steady-state steps within these frequencies"
     ])  # fmt: skip
-    table = _Table(freq_hz * units.time, stiffness, damping)
+    table = CardTable(freq_hz * units.time, stiffness, damping)
     return _text(program, link._replace(table=table, notes=(*link.notes, *about)), options)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # `card_real` rejects the numbers that come of it
-def _text(program: CardFormat, link: _Link, options: CardOptions) -> str:
+def _text(program: CardFormat, link: CardLink, options: CardOptions) -> str:
     """Write the elements of a joint, and what follows its nodes."""
     is_connector = options.get("connector", False)
     if is_connector and program != "abaqus":
@@ -231,6 +166,12 @@ def _text(program: CardFormat, link: _Link, options: CardOptions) -> str:
         lines = _calculix(link)
     elif program == "ansys":
         lines = _ansys(link)
+    elif program == "code_aster":
+        lines = code_aster_cards(link)
+    elif program == "lsdyna":
+        lines = lsdyna_cards(link, as_matrix=is_matrix or link.has_arms)
+    elif program == "subdyn":
+        lines = subdyn_cards(link)
     elif program == "abaqus":
         if is_connector or (link.table is not None and (is_matrix or link.has_arms)):
             lines = _abaqus_connector(link)
@@ -247,7 +188,7 @@ def _link(
     matrices: tuple[FloatArray, FloatArray, FloatArray],
     nodes: Sequence[int],
     options: CardOptions,
-) -> _Link:
+) -> CardLink:
     """Check the arguments of `cards`."""
     places = direction_places(dofs)
     units = model_units(options.get("units", "SI"))
@@ -272,12 +213,19 @@ def _link(
     positions, arms, where = _geometry(options, units)
     faces = _faces(options.get("faces"), numbers)
     notes = (note, *_text_lines(options.get("comments", ())), *_text_lines(where), *_arm_note(arms, units))
-    return _Link(wide[0], wide[1], wide[2], (*numbers, *turning), element, number, notes, arms, positions, units, faces)
+    first = options.get("damping_nodes")
+    if first is not None and program != "calculix":
+        raise ValueError(f"damping_nodes are for calculix, not for {program}; leave them out")
+    auxiliary = None if first is None else card_integer("damping_nodes", first)
+    return CardLink(
+        wide[0], wide[1], wide[2], (*numbers, *turning), element, number, notes, arms, positions, units, faces,
+        damping_nodes=auxiliary,
+    )  # fmt: skip
 
 
 def _widened(name: str, matrix: FloatArray, seconds: int, places: NDArray[np.intp], units: ModelUnits) -> FloatArray:
     """Return a matrix in all six directions, in units of the model."""
-    if abs(matrix - matrix.T).max() > _ROUND_OFF * abs(matrix).max():
+    if abs(matrix - matrix.T).max() > ROUND_OFF * abs(matrix).max():
         raise ValueError(f"the {name} of the joint must be symmetric to be exported")
     turns = places > 2
     rotations = turns.astype(int)[:, None] + turns
@@ -296,14 +244,14 @@ def _geometry(options: CardOptions, units: ModelUnits) -> tuple[FloatArray | Non
     given, points = options.get("positions"), options.get("points")
     if given is None:
         if points is not None:
-            raise ValueError("points needs positions, those of the two nodes")
+            raise ValueError("points needs positions of the two nodes")
         return None, np.zeros((2, 3)), []
     positions = as_real("positions", given, (2, 3))
     middle = positions.mean(axis=0)
     chosen = middle if points is None else np.asarray(points, dtype=np.float64)
     ends = as_real("points", np.broadcast_to(chosen, (2, 3)), (2, 3))
     arms = ends - positions
-    arms[abs(arms) < _NO_ARM / units.length] = 0
+    arms[abs(arms) < NO_ARM / units.length] = 0
     longest = units.length * float(np.linalg.norm(arms, axis=1).max())
     unit = units.words.partition(",")[0]
     if longest > _LONGEST_ARM:
@@ -311,7 +259,7 @@ def _geometry(options: CardOptions, units: ModelUnits) -> tuple[FloatArray | Non
             f"a node lies {longest / units.length:.4g} {unit} from the reference point of the joint; give positions "
             f"and points in {unit}, as in {units.name}"
         )
-    same = np.allclose(ends[0], ends[1], rtol=0, atol=_NO_ARM / units.length)
+    same = np.allclose(ends[0], ends[1], rtol=0, atol=NO_ARM / units.length)
     texts = [f"({', '.join(f'{value:.6g}' for value in end + 0.0)}) {unit}" for end in ends]
     where = texts[0] if same else f"{texts[0]} on side j, {texts[1]} on side k"
     midway = ", midway between the nodes" if points is None and arms.any() else ""
@@ -354,8 +302,12 @@ def _arm_note(arms: FloatArray, units: ModelUnits) -> list[str]:
     ]
 
 
-def _bodies(program: CardFormat, link: _Link) -> list[str]:
+def _bodies(program: CardFormat, link: CardLink) -> list[str]:
     """Make the nodes of the joint move with faces of solid elements; as a sketch in comments where nodes are apart."""
+    if program in _WITHOUT_FACES:
+        if link.faces is not None:
+            raise ValueError(f"faces are not written for {program}; leave them out and connect the faces there")
+        return []
     if link.faces is not None:
         return _body_cards(program, link.nodes, link.faces, link.element, link.number)
     if not link.has_arms:
@@ -363,7 +315,7 @@ def _bodies(program: CardFormat, link: _Link) -> list[str]:
     names = ("(nodes of the face on side j)", "(nodes of the face on side k)")
     drawn = _body_cards(program, link.nodes, names, link.element, link.number)
     hint = "solid elements have no rotations: let nodes of their faces follow j and k, as in"
-    mark = _MARKS[program]
+    mark = COMMENT_MARKS[program]
     return [f"{mark} {hint}", *(f"{mark}   {line}" for line in drawn)]
 
 
@@ -388,9 +340,11 @@ def rigid_cards(
         ROT NODEs. No equation holds a rotation that another one eliminates.
     """
     check_choice("program", program, get_args(CardFormat))
+    if program == "subdyn":
+        raise ValueError("subdyn has no equations between joints; connect rigid DOFs there by a rigid link")
     link = _link(program, dofs, (np.zeros((len(dofs), len(dofs))),) * 3, nodes, options)
     places = [int(place) for place in direction_places(dofs)]
-    mark = _MARKS[program]
+    mark = COMMENT_MARKS[program]
     names = ", ".join(DIRECTIONS[place] for place in places)
     lines = link.comments(mark)[1:] if alone else []
     lines.append(f"{mark} rigid DOFs {names}: one equation each, written by jointfrf")
@@ -402,13 +356,13 @@ def rigid_cards(
         if place < 3:
             for turn in (one for one in places if one > 2):  # theta_j is theta_k
                 row[6 + turn], row[turn] = row[6 + turn] + row[turn], 0.0
-        row[abs(row) < _NO_ARM / link.units.length] = 0.0
+        row[abs(row) < NO_ARM / link.units.length] = 0.0
         others = [i for i in range(12) if row[i] != 0 and i != place]
         lines += _equation(program, link, [(i, float(row[i])) for i in (place, *others)])
     return "\n".join([*lines, *(_bodies(program, link) if alone else [])]) + "\n"
 
 
-def _equation(program: CardFormat, link: _Link, terms: Sequence[tuple[int, float]]) -> list[str]:
+def _equation(program: CardFormat, link: CardLink, terms: Sequence[tuple[int, float]]) -> list[str]:
     """Return the equation of a sum of terms, (DOF among twelve, factor); the first one is eliminated."""
     if program == "calculix":
         ends = [(*link.calculix_dof(i), factor) for i, factor in terms]
@@ -418,6 +372,10 @@ def _equation(program: CardFormat, link: _Link, terms: Sequence[tuple[int, float
         words = [f"{node}, {dof}, {f'{factor:.12g}' if factor % 1 else f'{factor:.0f}.'}" for node, dof, factor in ends]
         rows = [", ".join(words[at : at + _TERMS]) for at in range(0, len(words), _TERMS)]
         return ["*EQUATION", str(len(ends)), *rows]
+    if program == "code_aster":
+        return code_aster_equation(ends)
+    if program == "lsdyna":
+        return lsdyna_equation(ends, link.number + terms[0][0])
     if program == "ansys":
         words = [f"{node},{_ANSYS_DOFS[dof - 1]},{factor:.12g}" for node, dof, factor in ends]
         rows = [",".join(words[at : at + 3]) for at in range(0, len(words), 3)]
@@ -425,7 +383,7 @@ def _equation(program: CardFormat, link: _Link, terms: Sequence[tuple[int, float
     fields: list[str | int | float] = [link.number]
     for at, (node, dof, factor) in enumerate(ends):
         fields += [*(("", "") if at and at % 2 == 0 else ()), node, dof, factor]
-    return _large("MPC", fields)
+    return large_card("MPC", fields)
 
 
 def _body_cards(
@@ -461,13 +419,6 @@ def _small(name: str, words: Sequence[str]) -> list[str]:
     return [f"{name if i == 0 else '+':<8}" + "".join(f"{word:>8}" for word in row) for i, row in enumerate(rows)]
 
 
-def card_integer(name: str, value: int) -> int:
-    """Check a number of a node, an element or a property: it has eight columns; raises ValueError."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 < value <= _LARGEST:
-        raise ValueError(f"{name} must be an integer from 1 to {_LARGEST}, not {reprlib.repr(value)}")
-    return int(value)
-
-
 def _two_nodes(name: str, nodes: Sequence[int]) -> tuple[int, int]:
     two = as_nodes(name, nodes)
     if len(two) != 2 or two[0] == two[1]:
@@ -475,52 +426,12 @@ def _two_nodes(name: str, nodes: Sequence[int]) -> tuple[int, int]:
     return card_integer(name, two[0]), card_integer(name, two[1])
 
 
-def _coupled(link: _Link) -> bool:
+def _coupled(link: CardLink) -> bool:
     tables = [] if link.table is None else [link.table.stiffness, link.table.damping]
     return any(np.count_nonzero(matrix * (1 - np.eye(6))) > 0 for matrix in (*link.matrices, *tables))
 
 
-def _upper_entries(link: _Link, matrix: FloatArray) -> list[tuple[int, int, int, int, float]]:
-    """(node, DOF, node, DOF, entry), DOFs from 1, of the upper triangle row by row."""
-    whole, nodes = link.both_sides(matrix), link.nodes
-    found = [(r, c) for r in range(12) for c in range(r, 12) if whole[r, c] != 0]
-    return [(nodes[r // 6], r % 6 + 1, nodes[c // 6], c % 6 + 1, float(whole[r, c])) for r, c in found]
-
-
-def card_real(value: float, columns: int = 20, letter: str = "E") -> str:
-    """Return a number with as many digits as its field takes, 14 at most.
-
-    Parameters
-    ----------
-    value : float
-    columns : int
-        Of the field: Abaqus and CalculiX read 20, large fields of Nastran have 16.
-    letter : str
-        Of the exponent; without one the exponent has its sign and no zeros in front, as in Nastran.
-
-    Raises
-    ------
-    ValueError
-        The number is not finite, or so small that it has lost digits.
-
-    Examples
-    --------
-    >>> from jointfrf.io.cards import card_real
-    >>> card_real(6e5), card_real(-6e5, 16, ""), card_real(-1.25e-120, 16, "")
-    ('6.0000000000000E+05', '-6.00000000000+5', '-1.250000000-120')
-    """
-    if not np.isfinite(value) or 0 < abs(value) < np.finfo(np.float64).tiny:
-        raise ValueError(f"a card cannot contain {value:g}; check joint, units and positions for a number out of range")
-    text = ""
-    for digits in range(13, _DIGITS - 1, -1):
-        mantissa, exponent = f"{value:.{digits}E}".split("E")
-        text = f"{mantissa}{letter}{exponent}" if letter else f"{mantissa}{int(exponent):+d}"
-        if len(text) <= columns:
-            break
-    return text
-
-
-def _abaqus_springs(link: _Link) -> list[str]:
+def _abaqus_springs(link: CardLink) -> list[str]:
     lines = link.comments("**")
     element = link.element
     joined = f"{link.nodes[0]}, {link.nodes[1]}"
@@ -553,7 +464,7 @@ def _abaqus_springs(link: _Link) -> list[str]:
     return lines
 
 
-def _abaqus_connector(link: _Link) -> list[str]:
+def _abaqus_connector(link: CardLink) -> list[str]:
     """One connector element, which direct steady-state steps take: its motion is that of node K as J carries it along.
 
     The relative motion of the joint's point is that of node K, moved by the arm of K as K turns against J.
@@ -573,7 +484,7 @@ def _abaqus_connector(link: _Link) -> list[str]:
     lines += [f"*ELEMENT, TYPE=CONN3D2, ELSET={name}", f"{link.element}, {j}, {k}"]
     lines += [f"*CONNECTOR SECTION, ELSET={name}, BEHAVIOR={name}_B", "CARTESIAN, CARDAN"]
     lines.append(f"*CONNECTOR BEHAVIOR, NAME={name}_B")
-    table = link.table or _Table(np.zeros(1), link.stiffness[None], link.damping[None])
+    table = link.table or CardTable(np.zeros(1), link.stiffness[None], link.damping[None])
     for word, matrices in (("ELASTICITY", table.stiffness), ("DAMPING", table.damping)):
         if not matrices.any():
             continue
@@ -586,7 +497,7 @@ def _abaqus_connector(link: _Link) -> list[str]:
     return lines
 
 
-def _abaqus_matrices(link: _Link) -> list[str]:
+def _abaqus_matrices(link: CardLink) -> list[str]:
     lines = [
         *link.comments("**"),
         "** matrices take part in steps of the SIM architecture, not in direct steady-state ones,",
@@ -599,24 +510,27 @@ def _abaqus_matrices(link: _Link) -> list[str]:
             name = f"JOINT{link.number}_{letter}"
             used.append(f"{word}={name}")
             lines += [f"*MATRIX INPUT, NAME={name}, TYPE=SYMMETRIC"]
-            lines += [f"{a}, {i}, {b}, {j}, {card_real(x)}" for a, i, b, j, x in _upper_entries(link, matrix)]
+            lines += [f"{a}, {i}, {b}, {j}, {card_real(x)}" for a, i, b, j, x in upper_entries(link, matrix)]
     if used:
         lines.append("*MATRIX ASSEMBLE, " + ", ".join(used))
     return lines
 
 
-def _calculix(link: _Link) -> list[str]:
+def _calculix(link: CardLink) -> list[str]:
     """Springs that add up to the matrix: SPRING2 for each entry off the diagonal, SPRING1 for what a row sums up to."""
-    if link.damping.any() or link.hysteretic.any():
+    if link.hysteretic.any():
+        raise ValueError("calculix has no complex spring between DOFs; leave damping out with damping=False")
+    if link.damping.any() and link.damping_nodes is None:
         raise ValueError(
-            "calculix has no dashpot between DOFs and no complex spring; leave damping out with damping=False"
+            "calculix takes dashpots between auxiliary nodes; name the first of them by damping_nodes, or leave "
+            "damping out with damping=False"
         )
     whole = link.both_sides(link.stiffness)
     at = link.calculix_dof
     springs: list[tuple[list[tuple[int, int]], float]] = []
     for a in range(12):
         springs += [([at(a), at(b)], -float(whole[a, b])) for b in range(a + 1, 12) if whole[a, b] != 0]
-        if abs(whole[a].sum()) > _ROUND_OFF * abs(whole[a]).sum():
+        if abs(whole[a].sum()) > ROUND_OFF * abs(whole[a]).sum():
             springs.append(([at(a)], float(whole[a].sum())))
     lines = link.comments("**")
     for i, (ends, k) in enumerate(springs):
@@ -624,20 +538,60 @@ def _calculix(link: _Link) -> list[str]:
         lines += [f"*ELEMENT, TYPE=SPRING{len(ends)}, ELSET={name}"]
         lines += [", ".join(map(str, (card_integer("element", link.element + i), *(node for node, _ in ends))))]
         lines += [f"*SPRING, ELSET={name}", ", ".join(str(dof) for _, dof in ends), card_real(k)]
+    return [*lines, *_calculix_dashpots(link, link.element + len(springs))]
+
+
+def _calculix_dashpots(link: CardLink, element: int) -> list[str]:
+    """Write C = sum of c g g^T, each term as a dashpot between a node that moves by g^T (u_j - u_k) and a held one.
+
+    DASHPOTA acts along the line between its nodes, which are one unit apart along x.
+    """
+    if not link.damping.any():
+        return []
+    assert link.damping_nodes is not None
+    lines = [
+        "** dashpots act between auxiliary nodes whose displacement is, by an equation, that of",
+        "**     the joint; for *STEADY STATE DYNAMICS and *MODAL DYNAMIC after",
+        "**     *FREQUENCY, STORAGE=YES",
+    ]
+    sides = np.hstack([sign * rigid_offset(DIRECTIONS, arm) for sign, arm in zip((1, -1), link.arms, strict=True)])
+    for i, (c, shape) in enumerate(_rank_one(link.damping)):
+        free, held = (card_integer("damping_nodes", link.damping_nodes + 2 * i + at) for at in (0, 1))
+        motion = shape @ sides
+        motion[abs(motion) < ROUND_OFF * abs(motion).max()] = 0.0
+        ends = [
+            (free, 1, -1.0),
+            *((*link.calculix_dof(at), float(motion[at])) for at in np.flatnonzero(motion).tolist()),
+        ]
+        words = [f"{node}, {dof}, {factor:.12E}" for node, dof, factor in ends]
+        name = f"JOINT{link.number}_C{i + 1}"
+        lines += ["*NODE", f"{free}, 0., 0., 0.", f"{held}, 1., 0., 0.", "*BOUNDARY", f"{free}, 2, 3", f"{held}, 1, 3"]
+        lines += ["*EQUATION", str(len(ends))]
+        lines += [", ".join(words[at : at + _TERMS]) for at in range(0, len(words), _TERMS)]
+        lines += [f"*ELEMENT, TYPE=DASHPOTA, ELSET={name}", f"{card_integer('element', element + i)}, {free}, {held}"]
+        lines += [f"*DASHPOT, ELSET={name}", "", card_real(c)]
     return lines
 
 
-def _large(first: str, fields: Sequence[str | int | float]) -> list[str]:
-    """Lines of a large-field card, four fields of 16 columns each."""
-    words = [(card_real(x, _WIDE, "") if x else "0.0") if isinstance(x, float) else str(x) for x in fields]
-    rows = [words[i : i + 4] for i in range(0, len(words), 4)]
-    return [
-        f"{first + '*' if i == 0 else '*':<8}" + "".join(f"{word:>16}" for word in row).rstrip()
-        for i, row in enumerate(rows)
-    ]
+def _rank_one(matrix: FloatArray) -> list[tuple[float, FloatArray]]:
+    """Return c and g of a symmetric matrix that is the sum of c g g^T; the largest entry of each g is 1."""
+    coupled = [i for i in range(6) if np.count_nonzero(np.delete(matrix[i], i))]
+    found = [(float(matrix[i, i]), np.eye(6)[i]) for i in range(6) if matrix[i, i] and i not in coupled]
+    if not coupled:
+        return found
+    own = matrix[np.ix_(coupled, coupled)]
+    size = np.sqrt(abs(own).max(axis=1))  # translations and rotations have different units
+    values, vectors = np.linalg.eigh(own / np.outer(size, size))
+    for value, vector in zip(values, vectors.T, strict=True):
+        if abs(value) > ROUND_OFF * abs(values).max():
+            shape = np.zeros(6)
+            shape[coupled] = size * vector
+            largest = shape[np.argmax(abs(shape))]
+            found.append((float(value * largest**2), shape / largest))
+    return found
 
 
-def _nastran_bush(link: _Link) -> list[str]:
+def _nastran_bush(link: CardLink) -> list[str]:
     k, c, h = (matrix.diagonal() for matrix in link.matrices)
     if link.table is not None and (_coupled(link) or not link.has_one_point):
         raise ValueError(
@@ -665,12 +619,12 @@ def _nastran_bush(link: _Link) -> list[str]:
         *(f"$ {line}" for line in apart),
         *system,
         *_bush(link, where),
-        *_large("PBUSH", fields),
+        *large_card("PBUSH", fields),
         *_bush_tables(link),
     ]
 
 
-def _bush_tables(link: _Link) -> list[str]:
+def _bush_tables(link: CardLink) -> list[str]:
     """Write PBUSHT and its tables; PBUSH holds what other analyses take, the first line."""
     if link.table is None:
         return []
@@ -684,22 +638,22 @@ def _bush_tables(link: _Link) -> list[str]:
             numbers.append(card_integer("number", number) if values.any() else "")
             if values.any():
                 pairs = [float(x) for pair in zip(link.table.freq, values, strict=True) for x in pair]
-                tables += _large("TABLED1", [number, "", "", "", "", "", "", "", *pairs, "ENDT"])
+                tables += large_card("TABLED1", [number, "", "", "", "", "", "", "", *pairs, "ENDT"])
                 number += 1
         if any(one != "" for one in numbers):
             fields += [*([] if fields == [link.number] else [""]), word, *numbers]
-    return [*_large("PBUSHT", fields), *tables]
+    return [*large_card("PBUSHT", fields), *tables]
 
 
-def _bush(link: _Link, where: list[str | int | float]) -> list[str]:
+def _bush(link: CardLink, where: list[str | int | float]) -> list[str]:
     """Write a CBUSH whose axes are those of the basic system."""
     numbers = [link.element, link.number, *link.nodes[:2]]
     if where:
-        return _large("CBUSH", [*numbers, "", "", "", 0, *where])
+        return large_card("CBUSH", [*numbers, "", "", "", 0, *where])
     return [f"{'CBUSH':<8}" + "".join(f"{number:8d}" for number in numbers) + " " * 24 + f"{0:8d}"]
 
 
-def _bush_place(link: _Link) -> tuple[list[str], list[str | int | float]] | None:
+def _bush_place(link: CardLink) -> tuple[list[str], list[str | int | float]] | None:
     """Say where the spring of a CBUSH is: cards of a coordinate system, and the fields S, OCID, S1, S2, S3.
 
     None where the joint has not one point on both sides: a CBUSH has one.
@@ -717,29 +671,21 @@ def _bush_place(link: _Link) -> tuple[list[str], list[str | int | float]] | None
     # A coordinate system that begins at grid GA: the same place, whether S1 to S3 count from there or from the system.
     corners = [node_j, node_j + np.array([0.0, 0.0, 1.0]), node_j + np.array([1.0, 0.0, 0.0])]  # of any length
     fields: list[str | int | float] = [link.number, 0, *(float(x) for corner in corners for x in corner)]
-    return _large("CORD2R", fields), ["", link.number, *(float(x) for x in link.arms[0])]
+    return large_card("CORD2R", fields), ["", link.number, *(float(x) for x in link.arms[0])]
 
 
-def _nastran_matrices(link: _Link) -> list[str]:
+def _nastran_matrices(link: CardLink) -> list[str]:
     names = {"K2GG": f"KJ{link.number}", "B2GG": f"BJ{link.number}", "K42GG": f"HJ{link.number}"}
     used = [(command, names[command], m) for command, m in zip(names, link.matrices, strict=True) if m.any()]
     if any(len(name) > 8 for _, name, _ in used):
         raise ValueError("number must have at most six digits, as a part of a name of eight characters")
     lines = [*link.comments("$"), "$ case control: " + ", ".join(f"{command} = {name}" for command, name, _ in used)]
     for _, name, matrix in used:
-        lines.append(f"DMIG    {name:<8}{0:8d}{6:8d}{2:8d}{0:8d}")
-        column = None
-        for node_a, dof_a, node_b, dof_b, value in _upper_entries(link, matrix):
-            # Symmetric: the entry of a row of the upper triangle is that of a column of the lower one.
-            if (node_a, dof_a) != column:
-                column = (node_a, dof_a)
-                lines += _large("DMIG", [name, node_a, dof_a, "", node_b, dof_b, value])
-            else:
-                lines += _large("", [node_b, dof_b, value])
+        lines += dmig(link, name, matrix)
     return lines
 
 
-def _ansys(link: _Link) -> list[str]:
+def _ansys(link: CardLink) -> list[str]:
     """MATRIX27 elements: the upper triangle row by row, UX ... ROTZ of node j, then of node k."""
     if link.hysteretic.any():
         raise ValueError("MATRIX27 of ansys has no hysteretic damping; leave damping out with damping=False")

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import Channel, ChannelPlace, ChannelRole, JointSide
 from jointfrf.io.csv_file import TextTable, read_text_table
+from jointfrf.io.pyfbs import is_pyfbs_heading, places_of_sheets
 from jointfrf.io.units import parse_unit
+from jointfrf.io.xlsx_file import is_sheet, read_sheet, sheet_names
 from jointfrf.kernel.arguments import one_line
 from jointfrf.spelling import did_you_mean
 from jointfrf.toml.declared import Keys, NotNegative, key, keys_of, read_keys
@@ -66,16 +68,19 @@ class ChannelTableKeys(Keys):
 _COLUMNS = ("channel", "node", "side", "role", "x", "y", "z", "direction_x", "direction_y", "direction_z", "weight")
 
 
-def read_channel_table(path: str | PathLike[str]) -> tuple[ChannelPlace, ...]:
-    r"""Read a table of channels from a TOML or a CSV file.
+def read_channel_table(path: str | PathLike[str], *, position_unit: str = "") -> tuple[ChannelPlace, ...]:
+    r"""Read a table of channels from a TOML or CSV file, or from an Excel workbook.
 
     Parameters
     ----------
     path : path-like
         ``.toml``: tables ``[[channel]]`` with the keys of `ChannelKeys`, and ``unit`` of positions (``"m"``, ``"mm"``,
-        ``"cm"``, ``"in"``; m by default). Any other name: one row for each channel under a heading out of channel,
-        node, side, role, x, y, z, direction_x, direction_y, direction_z, weight, between commas, semicolons or tabs;
-        units of positions in the heading as in ``x [mm]``.
+        ``"cm"``, ``"in"``; m by default). Any other name: one row for each channel, cells between commas, semicolons or
+        tabs. The heading has words out of channel, node, side, role, x, y, z, direction_x, direction_y, direction_z,
+        weight, with units of positions as in ``x [mm]``. A sheet ``book.xlsx#SHEET`` has the same columns.
+        ``test.xlsx#Channels_AB,Impacts_AB`` names two sheets of pyFBS.
+    position_unit : str
+        Unit of the positions of sheets of pyFBS, which do not state it: ``mm``.
 
     Returns
     -------
@@ -99,6 +104,10 @@ def read_channel_table(path: str | PathLike[str]) -> tuple[ChannelPlace, ...]:
     ('101:-z', 'j', [0.0125, 0.0, 0.006], [0.0, 0.0, -1.0])
     """
     file = Path(path)
+    if is_sheet(file) and "," in file.name.partition("#")[2]:
+        return places_of_sheets(file, position_unit)
+    if position_unit:
+        raise FileContentError(f"the unit {position_unit} of positions has no effect on {file}; leave it out")
     if file.suffix.lower() == ".toml":
         return _places_of(read_keys(read_toml(file), ChannelTableKeys))
     found = tuple(place for row in _csv_rows(file) for place in _places(row))
@@ -121,7 +130,13 @@ def _places_of(keys: ChannelTableKeys) -> tuple[ChannelPlace, ...]:
 
 def _csv_rows(file: Path) -> Iterator[ChannelKeys]:
     """Read the rows of a CSV file as tables [[channel]] with positions in m."""
-    table = read_text_table(file)
+    book, sheets = sheet_names(file)
+    table = read_sheet(book, sheets[0] if sheets else None) if is_sheet(file) else read_text_table(file)
+    if is_pyfbs_heading(table.heading):
+        raise FileContentError(
+            f"{file} has columns of pyFBS; name the sheets of channels and impacts, {book.stem}.xlsx#Channels,Impacts, "
+            "or use jointfrf.io.from_pyfbs"
+        )
     columns = [_column(file, word) for word in table.heading]
     names = [name for name, _ in columns]
     if len(set(names)) < len(names):

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.choices import FRF_FORMATS
 from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit, text_of, write_file
 from jointfrf.frf.frf_set import Channel, FrfSet
@@ -146,8 +147,7 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
     table = read_text_table(path, reading.skip_lines)
     where, units = str(path), reading.units
     frequency_unit = _frequency_unit(path, table.heading[0], units)
-    namer = reading.mapping.namer
-    columns = [_column(name, where, namer) for name in table.heading[1:]]
+    columns = _columns(table.heading[1:], where, reading)
     numbers = np.array([_numbers(table, place, cells) for place, cells in table.rows])
     if not numbers.size or not columns:
         raise FileContentError(f"{path} holds no table of numbers below its heading")
@@ -168,6 +168,7 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
         "skip_lines",
         "frequency",
         "components",
+        *(["responses", "excitations", "direction"] if reading.mapping.responses is not None else []),
         *(["phase"] if phases else []),
         *(["level"] if levels else []),
     )
@@ -231,8 +232,9 @@ def _without_heading(path: Path, name: str) -> str:
         if _PAIR.search(line) and (word in _FREQUENCY or parse_frequency_unit(unit) is not None):
             return f"{path} has its heading on line {number + 1}; give skip_lines={number}"
     return (
-        f"{path} has no heading that names frequencies and channels, but {name[:40]!r}; write one such as "
-        f"'{_HEADING}', or give skip_lines= to leave out a preamble"
+        f"{path} has no heading that names frequencies and channels, but {name[:40]!r}. If it is a table of FRFs, "
+        f"write one such as '{_HEADING}', or give skip_lines= to leave out a preamble; else name a file of FRFs (.uff, "
+        ".unv, .npz, .mat, .h5)"
     )
 
 
@@ -251,29 +253,71 @@ class _FrfPart(NamedTuple):
         return f"{self.part} of {self.pair[0]} / {self.pair[1]}"
 
 
+def _columns(names: list[str], where: str, reading: Reading) -> list[_FrfPart]:
+    """Read the headings of all columns; a table without channels takes those that the user names."""
+    namer, sides = reading.mapping.namer, ("responses", "excitations")
+    named = [side for side in sides if getattr(reading.mapping, side) is not None]
+    if not named:
+        return [_column(name, where, namer) for name in names]
+    if len(named) == 1:
+        missing = next(side for side in sides if side not in named)
+        raise FileContentError(f"{where}: mapping names {named[0]} only; give mapping {missing}=... too")
+    if any(_PAIR.search(name) for name in names):
+        raise FileContentError(f"{where} names its channels; leave out mapping responses= and excitations=")
+    parts = [_part_and_unit(name, where) for name in names]
+    # An FRF begins with the first part that the one before has.
+    numbers, held = list[int](), set[str]()
+    for part, _, _ in parts:
+        held = {part} if part in held else held | {part}
+        numbers.append((numbers[-1] if numbers else 0) + (len(held) == 1))
+    labels = [reading.mapping.names_of(side, numbers[-1], where) or [] for side in sides]
+    try:
+        pairs = [
+            (namer.channel("responses", row), namer.channel("excitations", column))
+            for row, column in zip(*labels, strict=True)
+        ]
+    except ValueError as error:
+        raise FileContentError(f"{where} {error}") from error
+    twice = next((pair for i, pair in enumerate(pairs) if pair in pairs[:i]), None)
+    if twice is not None:
+        raise FileContentError(f"{where}: mapping names {twice[0]} / {twice[1]} twice; name each FRF once")
+    return [_FrfPart(pairs[number - 1], *part) for number, part in zip(numbers, parts, strict=True)]
+
+
 def _column(name: str, where: str, namer: ChannelNamer) -> _FrfPart:
-    """Read a heading: all that is left without channels, part and words without a meaning is the unit."""
+    """Read a heading with its channels."""
     match = _PAIR.search(name)
-    if match is not None:
-        before, after = name[: match.start()], name[match.end() :]
-        if before.rstrip().endswith("(") and after.lstrip().startswith(")"):  # H(102:+y / 101:+y)
-            before, after = before.rstrip()[:-1], after.lstrip()[1:]
-        rest = " ".join(f"{before} {after}".split())
-        # Behind a bracket and dB only the unit follows, or a part that stands nowhere before: [dB re 1 m/N] mag.
-        named = _parts_in(rest, 0, _UNIT_BEGINS.search(rest)) or _parts_in(rest, _behind_brackets(rest), None)
-        if len({part for part, _ in named}) == 1:
-            part, place = named[0]
-            try:
-                pair = namer.channel("heading", match[1]), namer.channel("heading", match[2])
-            except ValueError as error:
-                raise FileContentError(f"{where} {error}") from error
-            rest = f"{rest[: place.start()]} {rest[place.end() :]}"
-            quantity = _QUANTITY.search(rest)
-            unit = " ".join(_FILLERS.sub(" ", _QUANTITY.sub(" ", rest)).strip(" ,;:/_-|").split())
-            return _FrfPart(pair, part, _without_in(unit), quantity[1].lower() if quantity else "")
-    raise FileContentError(
-        f"{where}: unknown column {name[:60]!r}; name response / excitation and real, imag, magnitude, phase or "
-        "coherence, such as '102:+y / 101:+y real [m/N]'"
+    if match is None:
+        raise _unknown_column(name, where)
+    before, after = name[: match.start()], name[match.end() :]
+    if before.rstrip().endswith("(") and after.lstrip().startswith(")"):  # H(102:+y / 101:+y)
+        before, after = before.rstrip()[:-1], after.lstrip()[1:]
+    part = _part_and_unit(name, where, " ".join(f"{before} {after}".split()))
+    try:
+        pair = namer.channel("heading", match[1]), namer.channel("heading", match[2])
+    except ValueError as error:
+        raise FileContentError(f"{where} {error}") from error
+    return _FrfPart(pair, *part)
+
+
+def _part_and_unit(name: str, where: str, rest: str | None = None) -> tuple[str, str, str]:
+    """Return part, unit and quantity: all that is left without channels, part and words without a meaning is unit."""
+    rest = " ".join(name.split()) if rest is None else rest
+    # Behind a bracket and dB only the unit follows, or a part that stands nowhere before: [dB re 1 m/N] mag.
+    named = _parts_in(rest, 0, _UNIT_BEGINS.search(rest)) or _parts_in(rest, _behind_brackets(rest), None)
+    if len({part for part, _ in named}) != 1:
+        raise _unknown_column(name, where)
+    part, place = named[0]
+    rest = f"{rest[: place.start()]} {rest[place.end() :]}"
+    quantity = _QUANTITY.search(rest)
+    unit = " ".join(_FILLERS.sub(" ", _QUANTITY.sub(" ", rest)).strip(" ,;:/_-|").split())
+    return part, _without_in(unit), quantity[1].lower() if quantity else ""
+
+
+def _unknown_column(name: str, where: str) -> FileContentError:
+    return FileContentError(
+        f"{where}: unknown column {name[:60]!r}; name response / excitation and part, '102:+y / 101:+y real [m/N]', "
+        "or give mapping responses= and excitations="
     )
 
 
@@ -407,8 +451,8 @@ def _looks_alike(path: Path, head: bytes) -> bool:
 
 
 CSV = FileFormat(
-    name="CSV",
-    suffixes=(".csv", ".txt"),
+    name=FRF_FORMATS["csv_file"].name,
+    suffixes=FRF_FORMATS["csv_file"].suffixes,
     content="text table",
     looks_alike=_looks_alike,
     read=_read,

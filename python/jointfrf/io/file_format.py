@@ -33,18 +33,19 @@ class FrfMapping:
     Parameters
     ----------
     freq_hz : str or array_like, optional
-        Field of the frequencies in Hz; or the frequencies; or first one and spacing, ``5:0.5``, each a number or the
-        name of a field.
+        Field of the frequencies in Hz, or the frequencies, or an NPY file in the folder of the FRFs, ``freq.npy``. Or
+        first frequency and spacing, ``5:0.5``, each a number or the name of a field.
     h, coherence, averages, quantity, unit : str, optional
         Names of fields; inside structures or groups with points between, ``test.frf``; of structure arrays with an
         index from 1, or all by a colon, ``test(3).frf``, ``test(:).frf``.
     real, imag, magnitude, phase_deg, phase_rad : str, optional
         Names of fields with the parts of the FRFs, in place of `h`.
     responses, excitations : str or sequence of str, optional
-        Field with the names of the channels, or these names. Of functions one by one: a name for each, in their order,
-        or one for all.
+        Field with the names of the channels, or these names. Functions one by one take a name for each, in their order,
+        or one for all. Or a table of pyFBS in the folder of the FRFs, ``test.xlsx#Channels_AB``.
     response_nodes, response_directions, excitation_nodes, excitation_directions : str, optional
-        Instead: fields of nodes, and of directions as names or codes 1 to 6; one value stands for all channels.
+        Instead: fields of nodes, or nodes such as ``1,2`` or ``1:81``; and fields of directions as names or codes 1 to
+        6, or one direction. One value stands for all channels.
     direction : str, optional
         Direction of the channels that have none in the file.
     components : str or mapping of str to int, optional

@@ -14,24 +14,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from jointfrf.choices import FRF_FORMATS, format_names
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.extras import MissingPackageError, load_plugin, plugin_call, plugins
 from jointfrf.files import ReadLimit, head_of
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.frf.merge import merge_frfs
 from jointfrf.io.arrays import as_frf_set
-from jointfrf.io.file_format import FileFormat, FrfArrays, FrfMapping, Reading
+from jointfrf.io.file_format import TIME_DATA, FileFormat, FrfArrays, FrfMapping, Reading
+from jointfrf.io.pyfbs import with_named_files
 
-__all__ = ["FORMATS", "check_suffix", "format_names", "read_frf_sets", "read_frfs", "write_frfs"]
-
-#: The modules of the formats. The order counts where a file has no mark, and for MATLAB 7.3, which is HDF5 inside.
-_MODULES = (
-    "uff",
-    "mat_file",
-    "npz_file",
-    "hdf5_file",
-    "csv_file",
-)
+__all__ = ["FORMATS", "check_suffix", "read_frf_sets", "read_frfs", "write_frfs"]
 
 
 def _format_of(module: str) -> FileFormat:
@@ -41,28 +34,21 @@ def _format_of(module: str) -> FileFormat:
 
 
 #: All formats, in the order in which their marks are looked for.
-FORMATS = tuple(map(_format_of, _MODULES))
+FORMATS = tuple(map(_format_of, FRF_FORMATS))
 #: Entry points by which other packages add formats; they are looked at where a file is of none of the above.
 _PLUGINS = "jointfrf.formats"
 #: Why a pickle is an error.
 _PICKLE = "is a pickle, which could run any program; save an NPZ file"
 #: What to do with files of LabVIEW.
-_FRFS_WANTED = ", which is not read; export its FRFs as a Universal File or CSV"
+_FRFS_WANTED = f", which is not read; export its FRFs as a Universal File or CSV; {TIME_DATA}"
 #: First bytes of files that are not read, and what the user can do.
 _OTHERS = (
-    (b"\x93NUMPY", "is an NPY file, one array without frequencies; save an NPZ file, or use frfs_of_arrays"),
     *((b"\x80" + bytes([protocol]), _PICKLE) for protocol in (2, 3, 4, 5)),
     (b"\x1f\x8b", "is compressed by gzip; unpack it"),
     (b"TDSm", f"is a TDMS file of LabVIEW{_FRFS_WANTED}"),
+    (b"RIFF", f"is a WAV file or another of time data; {TIME_DATA}"),
     (b"LabVIEW Measurement", f"is an LVM file of LabVIEW{_FRFS_WANTED}"),
 )
-
-
-def format_names(*, written: bool = False) -> str:
-    """Return the names of all formats with their suffixes, or of those that are written, as part of a sentence."""
-    chosen = [each for each in FORMATS if each.write is not None or not written]
-    names = [f"{each.name} ({' '.join(each.suffixes)})" for each in chosen]
-    return f"{', '.join(names[:-1])} {'or' if written else 'and'} {names[-1]}"
 
 
 def check_suffix(path: str | PathLike[str]) -> FileFormat:
@@ -146,7 +132,7 @@ def read_frfs(
     Parameters
     ----------
     *paths : path-like
-        Universal Files, MATLAB files (version 4 to 7; 7.3 needs h5py), NPZ files (own layout, scripts, sdynpy), HDF5
+        Universal Files, MATLAB files (version 5 to 7; 7.3 needs h5py), NPZ files (own layout, scripts, sdynpy), HDF5
         files (own layout, scripts), text tables. The format is detected from the content, not from the name.
     quantity : {"receptance", "mobility", "accelerance"}, optional
         What the FRFs are, where the files do not say it.
@@ -244,9 +230,13 @@ def _read_all(paths: Sequence[str | PathLike[str]], reading: Reading, limit_gb: 
 def _read(path: Path, reading: Reading, limit_gb: float | None) -> tuple[FrfSet, Collection[str] | None]:
     """Read one file; return also the options that it takes."""
     kind = _detected(path, head_of(path, limit_gb))
+    reading, tables = with_named_files(path, reading, limit_gb)
     found, takes = kind.read(path, ReadLimit(path, limit_gb), reading), kind.takes
     if isinstance(found, FrfArrays):
         takes = kind.takes if found.takes is None else found.takes
+        if tables is not None and takes is not None and "responses" in takes:
+            takes = {*takes, "coordinates"}
+            found.coordinates = {} if tables.oblique else tables.coordinates
         found = as_frf_set(found, str(path), reading)
         found = found if reading.nodes is None else found.at_nodes(reading.nodes)
     if not isinstance(found, FrfSet):  # of a plugin

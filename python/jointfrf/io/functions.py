@@ -13,7 +13,7 @@ from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit
 from jointfrf.frf.frf_set import Channel
 from jointfrf.frf.merge import same_lines
-from jointfrf.io.file_format import FrfArrays, FrfMapping
+from jointfrf.io.file_format import TIME_DATA, FrfArrays, FrfMapping
 from jointfrf.io.labels import ChannelNamer
 from jointfrf.io.units import SAME_FACTOR, parse_frequency_unit, parse_unit, si_label
 from jointfrf.spelling import some_of
@@ -27,8 +27,8 @@ __all__ = [
     "repetition_note",
 ]
 
-#: The function type of FRFs in sdynpy, as in Universal Files.
-_FRF = 4
+#: The function types of time histories and FRFs in sdynpy, as in Universal Files.
+_TIME, _FRF = 1, 4
 #: Beginnings of the types of FRFs, and types of ordinary coherence, in Testlab: letters and digits in lower case.
 _FRF_TYPES = ("frf", "frequencyresponse", "h1", "h2", "hv", "transferfunction", "inertance", "accelerance", "mobility",
               "receptance")  # fmt: skip
@@ -53,7 +53,7 @@ class LooseFunction(NamedTuple):
         return f"{'coherence' if self.is_coherence else 'FRF'} {self.response} / {self.excitation}"
 
 
-def arrays_of_functions(functions: Sequence[LooseFunction], where: str, limit: ReadLimit) -> FrfArrays:
+def arrays_of_functions(functions: Sequence[LooseFunction], where: str, limit: ReadLimit | None) -> FrfArrays:
     """Put functions into matrices.
 
     Returns
@@ -76,7 +76,8 @@ def arrays_of_functions(functions: Sequence[LooseFunction], where: str, limit: R
     row_of = {channel: i for i, channel in enumerate(responses)}
     column_of = {channel: j for j, channel in enumerate(excitations)}
     shape = (first.freq_hz.size, len(responses), len(excitations))
-    limit.take(3 * 8 * shape[0] * shape[1] * shape[2])
+    if limit is not None:
+        limit.take(3 * 8 * shape[0] * shape[1] * shape[2])
     h, coherence = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
     seen: set[tuple[Channel, Channel, bool]] = set()
     again: list[tuple[float, str]] = []
@@ -123,20 +124,24 @@ def repetition_note(share: float, which: str, count: int) -> str:
     return f"{count} further FRF{plural} between the same channels left out, the first is used; {apart}"
 
 
-def functions_of_sdynpy(data: Any, function_type: Any, mapping: FrfMapping, where: str) -> list[LooseFunction]:
-    """Return the functions of a structured array of sdynpy (`NDDataArray.save`); none where it is another array.
+def functions_of_sdynpy(fields: Mapping[str, Any], mapping: FrfMapping, where: str) -> list[LooseFunction]:
+    """Return the functions of a structured array of sdynpy (`NDDataArray.save`); none where there is no such array.
 
     Raises
     ------
     FileContentError
         They are not FRFs, or not each between one response and one reference.
     """
-    if not (isinstance(data, np.ndarray) and set(data.dtype.names or ()) >= {"abscissa", "ordinate", "coordinate"}):
+    data, kind = fields.get("data"), fields.get("function_type")
+    names = set(data.dtype.names or ()) if isinstance(data, np.ndarray) else set()
+    is_short = {"abscissa_start", "abscissa_step"} <= set(fields)
+    if not (names >= {"ordinate", "coordinate"} and ("abscissa" in names or is_short)):
         return []
-    if function_type != _FRF:
-        raise FileContentError(f"{where} holds functions of type {function_type} of sdynpy; save FRFs (type {_FRF})")
+    if kind != _FRF:
+        hint = TIME_DATA if kind == _TIME else f"save FRFs (type {_FRF})"
+        raise FileContentError(f"{where} holds functions of type {kind} of sdynpy; {hint}")
     found, namer = [], mapping.namer
-    for row in data.ravel():
+    for row in np.ravel(np.asarray(data)):
         try:
             places = [(each["node"], each["direction"]) for each in np.ravel(row["coordinate"])]
             channels = [namer.channel("coordinates", place) for place in places]
@@ -144,8 +149,20 @@ def functions_of_sdynpy(data: Any, function_type: Any, mapping: FrfMapping, wher
             raise FileContentError(f"{where} {error}") from error
         if len(channels) != 2:
             raise FileContentError(f"{where} has functions without one response and one reference each")
-        found.append(LooseFunction(channels[0], channels[1], np.ravel(row["abscissa"]), np.ravel(row["ordinate"])))
+        values = np.ravel(row["ordinate"])
+        found.append(LooseFunction(channels[0], channels[1], _abscissa(fields, row, values.size, where), values))
     return found
+
+
+def _abscissa(fields: Mapping[str, Any], row: Any, size: int, where: str) -> NDArray[np.float64]:
+    """Return the lines of a function of sdynpy: one by one, or by start and step of all functions."""
+    if "abscissa" in row.dtype.names:
+        return np.ravel(row["abscissa"])
+    try:
+        start, step = (float(np.asarray(fields[name]).item()) for name in ("abscissa_start", "abscissa_step"))
+    except (ValueError, TypeError) as error:
+        raise FileContentError(f"{where} is damaged: abscissa_start and abscissa_step are not numbers") from error
+    return np.asarray(start + step * np.arange(size))
 
 
 class _Column(NamedTuple):

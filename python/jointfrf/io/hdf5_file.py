@@ -12,6 +12,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.choices import FRF_FORMATS
 from jointfrf.errors import FileContentError
 from jointfrf.extras import import_extra
 from jointfrf.files import ReadLimit, damage_named, write_file
@@ -359,8 +360,8 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
 #: The signature of the format, and where it may be: at the beginning, or after a block of the user.
 _SIGN, _PLACES = b"\x89HDF\r\n\x1a\n", (0, 512, 1024, 2048, 4096)
 HDF5 = FileFormat(
-    name="HDF5",
-    suffixes=(".h5", ".hdf5"),
+    name=FRF_FORMATS["hdf5_file"].name,
+    suffixes=FRF_FORMATS["hdf5_file"].suffixes,
     content="own layout; arrays of scripts",
     has_mark=lambda head: any(head[place:].startswith(_SIGN) for place in _PLACES),
     read=_read,

@@ -8,12 +8,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from jointfrf.frf.frf_set import Channel
 from jointfrf.kernel.arguments import one_line
 
-__all__ = ["DIRECTION_CODES", "ChannelNamer", "channels_of", "channels_of_table", "is_table"]
+__all__ = ["DIRECTION_CODES", "ChannelNamer", "channels_of"]
 
 #: Directions by the codes of Universal Files, which sdynpy uses, too.
 DIRECTION_CODES = {1: "+x", 2: "+y", 3: "+z", 4: "+rx", 5: "+ry", 6: "+rz"}
@@ -21,10 +20,6 @@ DIRECTION_CODES |= {-code: "-" + direction[1:] for code, direction in DIRECTION_
 #: ``102:+y``, ``bar:102:+Y``, ``Point102 -Z``, ``102RX``, sdynpy's ``102Y+``; ``Point102`` and ``102:S`` have no
 #: direction.
 _LABEL = re.compile(r"(?:.*\D)?(\d{1,18})[\s:._]*(?:([+-]?)(r?[xyz])([+-]?)|s)?", re.IGNORECASE)
-#: Columns of the tables of channels of pyFBS.
-_POSITION, _DIRECTION = ("Position_1", "Position_2", "Position_3"), ("Direction_1", "Direction_2", "Direction_3")
-#: How far a direction may be off its axis, relative to its length, and channels of one node apart, m: rounding.
-_ALONG, _SAME_PLACE = 1e-6, 1e-9
 
 
 class ChannelNamer:
@@ -135,67 +130,3 @@ def _listed(labels: Any) -> list[Any]:
     if labels.dtype.kind in "iuf" and labels.ndim == 2 and labels.shape[1] == 2:
         return [tuple(row) for row in labels]
     return list(labels.ravel())
-
-
-def is_table(labels: Any) -> bool:
-    """Whether channels are given as a table of positions and directions, as pyFBS has them."""
-    return all(_has(labels, name) for name in _DIRECTION) if hasattr(labels, "__getitem__") else False
-
-
-def _has(table: Any, name: str) -> bool:
-    names = table.keys() if isinstance(table, Mapping) else getattr(table, "columns", ())
-    return name in list(names)
-
-
-def channels_of_table(
-    responses: Any, excitations: Any
-) -> tuple[tuple[Channel, ...], tuple[Channel, ...], dict[int, NDArray[np.float64]]]:
-    """Channels and coordinates of two tables of pyFBS.
-
-    Parameters
-    ----------
-    responses, excitations : mapping or DataFrame
-        Columns ``Position_1`` to ``Position_3`` in m and ``Direction_1`` to ``Direction_3``.
-
-    Returns
-    -------
-    responses, excitations : tuple of Channel
-        Channels at one place share a node; nodes are counted from 1 in the order of the tables.
-    coordinates : dict of int to ndarray, shape (3,)
-
-    Raises
-    ------
-    ValueError
-        A column is missing, or a direction is not along an axis.
-    """
-    coordinates: dict[int, NDArray[np.float64]] = {}
-    sides = []
-    for what, table in (("responses", responses), ("excitations", excitations)):
-        for name in (*_POSITION, *_DIRECTION):
-            if not _has(table, name):
-                raise ValueError(f"the table of the {what} has no column {name}")
-        places, directions = (
-            np.stack([np.asarray(table[name], dtype=np.float64) for name in names], axis=1)
-            for names in (_POSITION, _DIRECTION)
-        )
-        rows = enumerate(zip(places, directions, strict=True), start=1)
-        channels = tuple(Channel(_node(place, coordinates), _axis(what, row, way)) for row, (place, way) in rows)
-        sides.append(channels_of(f"table of the {what}", channels))
-    return sides[0], sides[1], coordinates
-
-
-def _node(place: NDArray[np.float64], coordinates: dict[int, NDArray[np.float64]]) -> int:
-    for node, known in coordinates.items():
-        if abs(known - place).max() <= _SAME_PLACE:
-            return node
-    coordinates[len(coordinates) + 1] = place
-    return len(coordinates)
-
-
-def _axis(what: str, row: int, direction: NDArray[np.float64]) -> str:
-    largest = int(np.argmax(abs(direction)))
-    rest = np.delete(direction, largest)
-    if not (np.isfinite(direction).all() and abs(rest).max() <= _ALONG * abs(direction[largest]) != 0.0):
-        way = ", ".join(f"{x:g}" for x in direction)
-        raise ValueError(f"row {row} of the {what} points along ({way}), not along an axis; use `virtual_point` for it")
-    return ("-" if direction[largest] < 0 else "+") + "xyz"[largest]

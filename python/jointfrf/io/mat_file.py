@@ -1,21 +1,27 @@
-"""MATLAB files. Versions 4 to 7 are read here, every stated size is compared with the file first; 7.3 is HDF5."""
+"""MATLAB files. Versions 5 to 7 are read here, every stated size is compared with the file first; 7.3 is HDF5."""
 
 from __future__ import annotations
 
+import io
 import math
 import zlib
+from dataclasses import replace
+from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.files import ReadLimit, damage_named
+from jointfrf.choices import FRF_FORMATS
+from jointfrf.errors import FileContentError
+from jointfrf.files import ReadLimit, damage_named, write_file
+from jointfrf.frf.frf_set import FrfSet
 from jointfrf.io.file_format import FileFormat, FrfArrays, Reading
 from jointfrf.io.hdf5_file import hdf5_fields
-from jointfrf.io.named_arrays import arrays_of_fields
+from jointfrf.io.named_arrays import arrays_of_fields, fields_of
 
-__all__ = ["MATLAB", "mat_fields"]
+__all__ = ["MATLAB", "mat_fields", "write_mat"]
 
 #: Bytes of the header; how it begins, and how that of a file of version 7.3.
 _HEAD, _MARK, _MARK_HDF5 = 128, b"MATLAB ", b"MATLAB 7.3"
@@ -32,10 +38,6 @@ _CELL, _STRUCT, _OBJECT, _CHAR, _OPAQUE = 1, 2, 3, 4, 17
 _CLASSES = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8"}
 #: The flag of complex numbers.
 _COMPLEX = 0x800
-#: Types of numbers in version 4.
-_OLD_NUMBERS = {0: "f8", 1: "f4", 2: "i4", 3: "i2", 4: "u2", 5: "u1"}
-#: Its header in bytes, above which number the byte order is the other one, and the form of texts.
-_OLD_HEAD, _OLD_MOST, _OLD_TEXT = 20, 5000, 1
 #: Cells inside cells: more than a sound file has, few enough for the stack.
 _DEEPEST = 20
 
@@ -66,7 +68,7 @@ def mat_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
             return _variables(content, limit)
         if content.startswith(_MARK):
             raise ValueError("it ends inside its header, or the header is damaged")
-        return _old_variables(content, limit)
+    raise FileContentError(f"{path} is no MATLAB file of version 5 or later; save it with the option -v7")
 
 
 def _variables(content: bytes, limit: ReadLimit) -> dict[str, Any]:
@@ -224,40 +226,6 @@ class _Arrays:
         return [self.array(part.data, depth + 1)[1] for part in parts]
 
 
-def _old_variables(content: bytes, limit: ReadLimit) -> dict[str, Any]:
-    """Read version 4, which has no mark."""
-    place, found = 0, dict[str, Any]()
-    while place < len(content):
-        if place + _OLD_HEAD > len(content):
-            raise ValueError("it ends inside a variable, or one is damaged")
-        sign = "<" if int.from_bytes(content[place : place + 4], "little") < _OLD_MOST else ">"
-        kind, rows, columns, is_complex, length = np.frombuffer(content, f"{sign}i4", 5, place).tolist()
-        type_, form = kind // 10 % 10, kind % 10
-        shape = (rows, columns)
-        is_sound = 0 <= kind < _OLD_MOST and type_ in _OLD_NUMBERS and is_complex in (0, 1)
-        if not is_sound or min(rows, columns, length) < 0:
-            raise ValueError("it ends inside a variable, or one is damaged")
-        number = np.dtype(sign + _OLD_NUMBERS[type_])
-        start = place + _OLD_HEAD + length
-        end = start + number.itemsize * rows * columns * (1 + is_complex)
-        if end > len(content):
-            raise ValueError("it ends inside a variable, or one is damaged")
-        limit.take(2 * (end - start))
-        name = _word(content[place + _OLD_HEAD : start])
-        values = np.frombuffer(content, number, rows * columns * (1 + is_complex), start).astype(_OLD_NUMBERS[type_])
-        if form == _OLD_TEXT:
-            letters = "".join(map(chr, np.clip(np.nan_to_num(values), 0, 0xFF).astype(int).tolist()))
-            texts = ["".join(letters[row::rows]) for row in range(rows)]
-            found[name] = texts[0] if len(texts) == 1 else np.array(texts)
-        elif form == 0:
-            half = rows * columns
-            found[name] = _squeezed(_complex(values[:half], values[half:]) if is_complex else values, shape)
-        else:
-            found[name] = None
-        place = end
-    return found
-
-
 def _name(part: _Element) -> str:
     return _word(bytes(part.data))
 
@@ -294,15 +262,57 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
     with path.open("rb") as file:
         is_hdf5 = file.read(len(_MARK_HDF5)) == _MARK_HDF5
     fields = hdf5_fields(path, limit) if is_hdf5 else mat_fields(path, limit)
-    return arrays_of_fields(fields, reading.mapping, str(path), limit, keeps_shapes=False)
+    is_own = {"jointfrf_frfs", "h"} <= set(fields) and not reading.mapping.names_frfs
+    mapping = replace(reading.mapping, axes=reading.mapping.axes or "freq,out,in") if is_own else reading.mapping
+    found = arrays_of_fields(fields, mapping, str(path), limit, keeps_shapes=False)
+    if is_own and {"nodes", "coordinates"} <= set(fields):
+        nodes, places = (np.asarray(fields[name]) for name in ("nodes", "coordinates"))
+        if nodes.dtype.kind not in "iuf" or places.dtype.kind not in "iuf" or places.size != 3 * nodes.size:
+            raise FileContentError(f"{path}: coordinates do not contain three numbers for each of {nodes.size} nodes")
+        found.coordinates = {int(node): place for node, place in zip(nodes.ravel(), places.reshape(-1, 3), strict=True)}
+    return found
+
+
+def write_mat(path: str | PathLike[str], frfs: FrfSet) -> None:
+    """Write measured FRFs as a MATLAB file of version 5.
+
+    Parameters
+    ----------
+    path : path-like
+        In a folder that exists; an older file is replaced as a whole or not at all.
+    frfs : FrfSet
+        The FRFs, with coherence, number of averages and coordinates if they are known.
+
+    Raises
+    ------
+    ValueError
+        There is no FRF, or one is NaN or infinite on some lines only.
+    OSError
+        The file cannot be written; nothing is left behind.
+
+    Notes
+    -----
+    Variables in SI units: ``freq_hz`` (lines x 1), ``h`` (lines x responses x excitations, NaN where there is no FRF),
+    ``responses`` and ``excitations`` (columns of cells with names such as ``102:+y``), ``quantity``, ``unit``, and
+    ``coherence``, ``averages``, ``nodes``, ``coordinates`` if they are known.
+    """
+    import scipy.io
+
+    fields = {name: value for name, value in fields_of(frfs).items() if not name.startswith(("setup", "sha256"))}
+    for name in ("responses", "excitations"):
+        fields[name] = fields[name].astype(object)[:, None]
+    content = io.BytesIO()
+    scipy.io.savemat(content, fields | {"freq_hz": frfs.freq_hz[:, None]}, oned_as="column", do_compression=True)
+    write_file(Path(path), content.getvalue())
 
 
 MATLAB = FileFormat(
-    name="MATLAB",
-    suffixes=(".mat",),
-    content="versions 4 to 7.3: structures of Simcenter Testlab; arrays of scripts",
+    name=FRF_FORMATS["mat_file"].name,
+    suffixes=FRF_FORMATS["mat_file"].suffixes,
+    content="versions 5 to 7.3: `write_mat`; structures of Simcenter Testlab; arrays of scripts",
     has_mark=lambda head: head.startswith(_MARK),
-    looks_alike=lambda path, _: path.suffix.lower() == ".mat",  # version 4 has no mark
+    looks_alike=lambda path, _: path.suffix.lower() == ".mat",
     read=_read,
+    write=write_mat,
     needs="`jointfrf[hdf5]` for version 7.3",
 )

@@ -63,6 +63,8 @@ _TAKEN_BY_ARRAYS = (*(each.name for each in dataclass_fields(FrfMapping)), "freq
 _PARTS = ("real", "imag", "magnitude", "phase_deg", "phase_rad")
 #: Frequencies that the user gives: a list of numbers, or first one and spacing.
 _LITERAL = re.compile(r"[,:]|^[0-9.]+$")
+#: Nodes that the user gives, one by one or as ranges; longer ranges are slips.
+_NODES, _MOST_NODES = re.compile(r"\d{1,18}(?::\d{1,18})?(?:,\d{1,18}(?::\d{1,18})?)*"), 100_000
 #: Fields that a message names, and characters of each.
 _SHOWN, _NAME = 12, 30
 #: Names of FRFs that say their quantity, and of frequencies in rad/s.
@@ -96,7 +98,7 @@ def arrays_of_fields(
     """
     if keeps_shapes and (_MARK in fields or _CHECKSUM in fields):
         return _own_arrays(fields, where)
-    functions, notes = functions_of_sdynpy(fields.get("data"), fields.get("function_type"), mapping, where), list[str]()
+    functions, notes = functions_of_sdynpy(fields, mapping, where), list[str]()
     exported = None if mapping.names_frfs else functions_of_testlab(fields, mapping, where)
     if exported is not None:
         functions, notes = exported
@@ -440,8 +442,8 @@ def _field(flat: Mapping[str, Any], name: str, given: Any, where: str) -> tuple[
             return "", [each.strip() for each in given.split(",")]
         if name == "unit" or (name == "freq_hz" and _LITERAL.search(given)):
             return "", given
-        if name.endswith("_nodes") and given.replace(",", "").isdecimal():
-            return "", [int(number) for number in given.split(",")]
+        if name.endswith("_nodes") and _NODES.fullmatch(given):
+            return "", _nodes(given, where)
         if name.endswith("_directions") and _is_direction(given):
             return "", given
         inside = [path for path in flat if path.startswith((f"{given}.", f"{given}("))]
@@ -451,6 +453,14 @@ def _field(flat: Mapping[str, Any], name: str, given: Any, where: str) -> tuple[
     if len(found) > 1:
         raise FileContentError(f"{where} has several fields for {name}; give mapping {name}=... out of {_names(found)}")
     return (found[0], flat[found[0]]) if found else None
+
+
+def _nodes(given: str, where: str) -> list[int]:
+    """Return nodes that the user lists, 1,2,3 or ranges 1:81, ends included."""
+    ends = [[int(number) for number in word.split(":")] for word in given.split(",")]
+    if any(pair[0] > pair[-1] or pair[-1] - pair[0] > _MOST_NODES for pair in ends):
+        raise FileContentError(f"{where}: {given} is no list of nodes such as 1,2 or 1:81")
+    return [node for pair in ends for node in range(pair[0], pair[-1] + 1)]
 
 
 def _is_direction(word: str) -> bool:

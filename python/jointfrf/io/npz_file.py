@@ -8,18 +8,19 @@ import zipfile
 import zlib
 from os import PathLike
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.choices import FRF_FORMATS
 from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit, damage_named, write_file
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.io.file_format import FileFormat, FrfArrays, Reading
 from jointfrf.io.named_arrays import arrays_of_fields, fields_of
 
-__all__ = ["NPZ", "npz_fields", "write_npz"]
+__all__ = ["NPZ", "npy_array", "npz_fields", "write_npz"]
 
 
 def npz_fields(path: Path, limit: ReadLimit, file: BinaryIO | None = None) -> dict[str, NDArray[Any]]:
@@ -35,31 +36,42 @@ def npz_fields(path: Path, limit: ReadLimit, file: BinaryIO | None = None) -> di
         zipfile.ZipFile(file or path) as archive,
     ):
         return {
-            info.filename.removesuffix(".npy"): _array(archive, info, path, limit)
+            info.filename.removesuffix(".npy"): _member(archive, info, path, limit)
             for info in archive.infolist()
             if info.filename.endswith(".npy")
         }
 
 
-def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path, limit: ReadLimit) -> NDArray[Any]:
-    """Read one array after the size that it states is checked against that of the file and the limit."""
+def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path, limit: ReadLimit) -> NDArray[Any]:
     with archive.open(info) as member:
-        version = np.lib.format.read_magic(member)
-        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, _, dtype = read(member)
-        if dtype.hasobject:
-            raise FileContentError(
-                f"{path} holds Python objects ({info.filename}), which could run any program; save plain arrays"
-            )
-        count = int(np.prod(shape, dtype=object))
-        if info.file_size != member.tell() + dtype.itemsize * count:
-            size = " x ".join(map(str, shape))
-            raise FileContentError(
-                f"{path} is damaged: {info.filename} has not the {size} values that it states; write it again"
-            )
-        limit.take(max(dtype.itemsize, 1) * count)
-    with archive.open(info) as member:
-        return np.asarray(np.lib.format.read_array(member, allow_pickle=False))
+        return npy_array(cast(BinaryIO, member), info.file_size, str(path), info.filename, limit)
+
+
+def npy_array(file: BinaryIO, size: int, where: str, name: str, limit: ReadLimit) -> NDArray[Any]:
+    """Read one array after the size that it states is checked against the bytes there are, and the limit.
+
+    Parameters
+    ----------
+    file : file
+        Open at the beginning of the array.
+    size : int
+        Bytes from there to its end.
+    where, name : str
+        The file and the array in it, for messages.
+    limit : ReadLimit
+    """
+    version = np.lib.format.read_magic(file)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(file)
+    if dtype.hasobject:
+        raise FileContentError(f"{where} holds Python objects ({name}), which could run any program; save plain arrays")
+    count = int(np.prod(shape, dtype=object))
+    if size != file.tell() + dtype.itemsize * count:
+        stated = " x ".join(map(str, shape))
+        raise FileContentError(f"{where} is damaged: {name} has not the {stated} values that it states; write it again")
+    limit.take(max(dtype.itemsize, 1) * count)
+    file.seek(0)
+    return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
 
 
 def write_npz(path: str | PathLike[str], frfs: FrfSet) -> None:
@@ -114,8 +126,8 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
 
 
 NPZ = FileFormat(
-    name="NPZ",
-    suffixes=(".npz",),
+    name=FRF_FORMATS["npz_file"].name,
+    suffixes=FRF_FORMATS["npz_file"].suffixes,
     content="own layout; arrays of scripts; `NDDataArray.save` of sdynpy",
     has_mark=lambda head: head.startswith(b"PK"),
     read=_read,

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.choices import FRF_FORMATS
 from jointfrf.errors import FileContentError
 from jointfrf.files import HEAD, ReadLimit, head_of, write_file
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, ROUND_OFF, Channel, FrfSet, same_frf
@@ -677,8 +678,8 @@ def _begins_dataset(head: bytes) -> bool:
 
 
 UNIVERSAL_FILE = FileFormat(
-    name="Universal File",
-    suffixes=(".uff", ".unv"),
+    name=FRF_FORMATS["uff"].name,
+    suffixes=FRF_FORMATS["uff"].suffixes,
     content="datasets 58 and 58b (FRFs, coherence), 15, 2411 (nodes), 164 (units), 18, 2420 (axes)",
     has_mark=_begins_dataset,
     looks_alike=lambda path, _: path.suffix.lower() in (".uff", ".unv"),

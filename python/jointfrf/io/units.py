@@ -7,8 +7,9 @@ import re
 import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-from typing import Literal, get_args
+from typing import get_args
 
+from jointfrf.choices import UnitSystemName
 from jointfrf.kernel.arguments import check_choice, one_line
 
 __all__ = [
@@ -389,9 +390,6 @@ _EXAMPLES = {
     "phase": "deg or rad",
     "coordinates": "m, mm or in",
 }
-
-
-UnitSystemName = Literal["SI", "mm-t-s", "mm-kg-ms"]
 
 
 @dataclass(frozen=True)

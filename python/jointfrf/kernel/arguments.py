@@ -41,8 +41,10 @@ __all__ = [
     "as_real",
     "as_square",
     "as_values",
+    "check_apart",
     "check_choice",
     "check_finite_lines",
+    "check_out",
     "check_type",
     "checked_out",
     "chunks",
@@ -69,6 +71,8 @@ CHUNK_BYTES = 64 * 2**20
 #: Lines that the kernel takes as one share, of large matrices and of small ones; chunks are multiples of it, so that
 #: they change no bit of a result.
 _SHARE, _LONG_SHARE = 64, 512
+#: Sweeps of so many lines are one chunk, whatever their size.
+ONE_CHUNK = 2 * _SHARE - 1
 
 
 def as_array(name: str, value: ArrayLike) -> NDArray[Any]:
@@ -104,15 +108,10 @@ def _converted(name: str, value: ArrayLike, dtype: np.dtype[Any], *, later: bool
 
 def _fits(value: object, rows: int | None, columns: int | None, n_freq: int | None) -> bool:
     """Whether a value is what `as_lines` returns: the case that must cost nothing."""
-    if type(value) is not np.ndarray or value.dtype is not _COMPLEX or value.ndim != 3:
-        return False
-    lines, n, m = value.shape
-    return (
-        (n_freq is None or lines == n_freq)
-        and (rows is None or n == rows)
-        and (columns is None or m == columns)
-        and value.flags.c_contiguous
-    )
+    if type(value) is np.ndarray and value.dtype is _COMPLEX and value.ndim == 3 and value.flags.c_contiguous:
+        lines, n, m = value.shape
+        return (n_freq is None or lines == n_freq) and (rows is None or n == rows) and (columns is None or m == columns)
+    return False
 
 
 def as_lines(
@@ -140,6 +139,10 @@ def as_lines(
 
 def as_square(name: str, value: ArrayLike, n_freq: int | None = None, *, later: bool = False) -> ComplexArray:
     """Return a sweep of square matrices, as `as_lines` does."""
+    if type(value) is np.ndarray and value.dtype is _COMPLEX and value.ndim == 3 and value.flags.c_contiguous:
+        lines, n, m = value.shape
+        if n == m and (n_freq is None or lines == n_freq):
+            return value  # the case that must cost nothing
     array = as_lines(name, value, n_freq=n_freq, later=later)
     if array.shape[1] != array.shape[2]:
         raise ValueError(f"{name} must hold square matrices, not {array.shape[1]} x {array.shape[2]}")
@@ -343,6 +346,24 @@ def checked_out(
     out: ComplexArray, shape: tuple[int, ...], args: Sequence[Any], sweeps: Mapping[str, NDArray[Any]]
 ) -> ComplexArray:
     """Return `out` if results can be written into it; no array of `args` may share its memory."""
+    check_out(out, shape)
+    for array in args:
+        if isinstance(array, np.ndarray):
+            check_apart(out, array, sweeps)
+    return out
+
+
+def check_apart(out: ComplexArray, array: NDArray[Any], sweeps: Mapping[str, NDArray[Any]]) -> None:
+    """Raise if `out` shares memory with an argument. Two arrays that both own their memory (no `base`) share none."""
+    if np.may_share_memory(out, array):
+        names = [name for name, sweep in sweeps.items() if sweep is array]
+        raise ValueError(f"out must not share memory with {names[0] if names else 'an argument'}")
+
+
+def check_out(out: ComplexArray, shape: tuple[int, ...]) -> None:
+    """Raise unless `out` is an array of complex numbers of this shape, in C order, aligned and writeable."""
+    if type(out) is np.ndarray and out.shape == shape and out.dtype is _COMPLEX and out.flags.carray:
+        return
     if not isinstance(out, np.ndarray):
         raise TypeError(f"out must be a numpy array, not {type(out).__name__}")
     if isinstance(out, np.ma.MaskedArray):
@@ -355,11 +376,6 @@ def checked_out(
         raise ValueError("out must be contiguous in C order and aligned")
     if not out.flags.writeable:
         raise ValueError("out must be writeable")
-    for array in args:
-        if isinstance(array, np.ndarray) and np.may_share_memory(out, array):
-            names = [name for name, sweep in sweeps.items() if sweep is array]
-            raise ValueError(f"out must not share memory with {names[0] if names else 'an argument'}")
-    return out
 
 
 def is_mapped(array: NDArray[Any]) -> bool:

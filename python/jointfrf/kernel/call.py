@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import reprlib
+import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,9 +16,23 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+if sys.platform == "win32":
+    # Loads the LAPACK: Windows looks for DLLs beside the program, not beside what links to them.
+    import scipy_openblas32  # noqa: F401
+
 import jointfrf._kernel as _kernel
 from jointfrf.errors import IllConditionedWarning, SingularLineError
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_choice, checked_out, chunks, in_one_piece, release
+from jointfrf.kernel.arguments import (
+    ONE_CHUNK,
+    ComplexArray,
+    FloatArray,
+    check_apart,
+    check_choice,
+    check_out,
+    chunks,
+    in_one_piece,
+    release,
+)
 
 __all__ = [
     "N_FREQ",
@@ -54,6 +69,8 @@ _NO_ENGINE = -1001
 _ON_SINGULAR = get_args(OnSingular)
 #: Types of the arrays that the kernel takes.
 _COMPLEX, _INTEGER = np.dtype(np.complex128), np.dtype(np.int32)
+#: Looked up once: a call of one line takes two microseconds.
+_empty, _ndarray = np.empty, np.ndarray
 #: Stands for the number of lines among the arguments of a kernel routine.
 N_FREQ = object()
 Engine = Literal["auto", "lapack", "plain", "x86-64-v2", "x86-64-v3", "x86-64-v4"]
@@ -113,8 +130,6 @@ def check_status(
             singular,
             None if freq_hz is None else freq_hz[singular],
         )
-    if not n_bad and (rcond_limit <= 0 or status.lowest_rcond >= rcond_limit):
-        return
     poor = np.flatnonzero((status.rcond < rcond_limit) & (info == 0))
     if poor.size:
         worst = poor[np.argmin(status.rcond[poor])]
@@ -138,7 +153,8 @@ def check_lines(
     check_choice("on_singular", on_singular, get_args(OnSingular))
     if status.line_info.size:
         n_bad = int((status.line_info != 0).sum())
-        check_status(routine, status, n_bad, sweeps, freq_hz, on_singular, rcond_limit)
+        if n_bad or status.lowest_rcond < rcond_limit:
+            check_status(routine, status, n_bad, sweeps, freq_hz, on_singular, rcond_limit)
 
 
 def _check_info(routine: str, info: int) -> None:
@@ -163,8 +179,8 @@ def run(
     rcond_limit: float = RCOND_LIMIT,
     out: ComplexArray | None = None,
     singular_rcond: float = 0.0,
-) -> tuple[ComplexArray, LineStatus]:
-    """Call a kernel routine.
+) -> tuple[ComplexArray, NDArray[np.int32], FloatArray]:
+    """Call a kernel routine; of few lines it takes less time than one call of numpy.linalg.
 
     Parameters
     ----------
@@ -193,28 +209,44 @@ def run(
     Returns
     -------
     result : ndarray, shape `shape`
-    status : LineStatus
+    line_info, rcond : ndarray, shape (n_freq,)
+        As of `LineStatus`.
     """
-    check_choice("on_singular", on_singular, _ON_SINGULAR)
+    if type(on_singular) is not str or on_singular not in _ON_SINGULAR:
+        check_choice("on_singular", on_singular, _ON_SINGULAR)
     n_freq = shape[0]
-    result = np.empty(shape, _COMPLEX) if out is None else checked_out(out, shape, args, sweeps)
-    status = LineStatus(np.empty(n_freq, _INTEGER), np.empty(n_freq))
-    if not result.size:
-        status.line_info[:], status.rcond[:] = 0, 1
+    if out is None:
+        result = _empty(shape, _COMPLEX)
     else:
-        kernel = getattr(_kernel, "jf_" + routine)
-        if in_one_piece(result, sweeps):
-            whole = [n_freq if a is N_FREQ else a.T if isinstance(a, np.ndarray) else a for a in args]
-            n_bad = kernel(*whole, result.T, *status)
-            _check_info(routine, n_bad)
+        result = out
+        check_out(out, shape)
+    whole: list[Any] = []
+    for a in args:
+        if isinstance(a, _ndarray):
+            if out is not None and (a.base is not None or out.base is not None or a is out):
+                check_apart(out, a, sweeps)
+            whole.append(a.T)
         else:
-            n_bad = _run_in_chunks(routine, kernel, args, result, status, sweeps)
-        if status.lowest_rcond < singular_rcond:
-            lost = (status.line_info == 0) & (status.rcond < singular_rcond)
-            n_bad += int(lost.sum())
-            result[lost], status.line_info[lost], status.rcond[lost] = np.nan, _LINE_SINGULAR, 0
-        check_status(routine, status, n_bad, sweeps, freq_hz, on_singular, rcond_limit)
-    return result, status
+            whole.append(n_freq if a is N_FREQ else a)
+    line_info, rcond = _empty(n_freq, _INTEGER), _empty(n_freq)
+    if not result.size:
+        line_info[:], rcond[:] = 0, 1
+        return result, line_info, rcond
+    kernel = getattr(_kernel, "jf_" + routine)
+    if n_freq <= ONE_CHUNK or in_one_piece(result, sweeps):
+        n_bad = kernel(*whole, result.T, line_info, rcond)
+        if n_bad < 0:
+            _check_info(routine, n_bad)
+    else:
+        n_bad = _run_in_chunks(routine, kernel, args, result, LineStatus(line_info, rcond), sweeps)
+    lowest = rcond.item(rcond.argmin())
+    if lowest < singular_rcond:
+        lost = (line_info == 0) & (rcond < singular_rcond)
+        n_bad += int(lost.sum())
+        result[lost], line_info[lost], rcond[lost] = np.nan, _LINE_SINGULAR, 0
+    if n_bad or lowest < rcond_limit:
+        check_status(routine, LineStatus(line_info, rcond), n_bad, sweeps, freq_hz, on_singular, rcond_limit)
+    return result, line_info, rcond
 
 
 def _run_in_chunks(
@@ -253,12 +285,12 @@ def call(routine: str, args: Sequence[Any]) -> None:
     _check_info(routine, info_of(routine, args))
 
 
-def call_for_number(routine: str, args: Sequence[Any]) -> tuple[float, int]:
-    """Call as `call` does a routine that returns a number before its `info`; return both, an `info` > 0 included."""
+def call_for_number(routine: str, args: Sequence[Any]) -> tuple[float, ...]:
+    """Call as `call` does a routine that returns numbers before its `info`; return all, an `info` > 0 included."""
     views = [a.T if isinstance(a, np.ndarray) else a for a in args]
-    number, info = getattr(_kernel, "jf_" + routine)(*views)
-    _check_info(routine, info)
-    return float(number), int(info)
+    numbers = tuple(map(float, getattr(_kernel, "jf_" + routine)(*views)))
+    _check_info(routine, int(numbers[-1]))
+    return numbers
 
 
 def info_of(routine: str, args: Sequence[Any]) -> int:

@@ -91,7 +91,7 @@ def reciprocal_condition(a: ArrayLike) -> FloatArray:
     """
     lines = as_square("a", a, later=True)
     args = (lines.shape[1], N_FREQ, lines)
-    return run("invert", args, lines.shape, {"a": lines}, None, "nan")[1].rcond
+    return run("invert", args, lines.shape, {"a": lines}, None, "nan")[2]
 
 
 def solve(

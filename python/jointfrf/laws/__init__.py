@@ -5,5 +5,6 @@ springs       springs with viscous and hysteretic damping
 viscoelastic  rubber and polymers: standard linear solid, fractional Zener, power law
 function_law  a user-defined law: a function with its derivatives
 law_joint     a joint of laws by DOF, cross terms, masses, rigid DOFs; as input of finite-element programs
-joint_toml    the laws that files can hold, joints in TOML files
+words         the laws that files can hold, by their words
+joint_toml    joints in TOML files
 """

@@ -4,28 +4,24 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any
+from importlib import import_module
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from msgspec import field
 
 from jointfrf.dofs import UNITS
-from jointfrf.extras import load_plugin, plugins
+from jointfrf.extras import load_plugin
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.laws.law import JointLaw, LawField
 from jointfrf.laws.law_joint import LawJoint
-from jointfrf.laws.springs import SpringLaw
-from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinearSolid
+from jointfrf.laws.words import LAW_WORDS, LAWS, law_of_plugin
 from jointfrf.spelling import did_you_mean
 from jointfrf.toml.declared import Keys, NotNegative, key, read_keys
 from jointfrf.toml.table import TomlTable
 
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
-
 __all__ = [
-    "LAW_WORDS",
     "ConstantsKeys",
     "LawJointKeys",
     "joint_text",
@@ -36,35 +32,17 @@ __all__ = [
     "takes_in_words",
 ]
 
-#: The laws that files can hold: a new law is a file with its class, and its name here.
-LAWS: tuple[type[JointLaw], ...] = (SpringLaw, StandardLinearSolid, FractionalZener, PowerLaw)
 #: Laws by their words.
-_BY_WORD = {law.word: law for law in LAWS}
-
-
-def _of_plugin(word: object) -> EntryPoint | None:
-    """Return the entry point of this name by which another package adds a law."""
-    return next((entry for entry in plugins("jointfrf.laws") if entry.name == word), None)
-
-
-class _LawWords(tuple[str, ...]):
-    """Words of our own laws; those of plugins are found in it, too."""
-
-    __slots__ = ()
-
-    def __contains__(self, word: object) -> bool:
-        return super().__contains__(word) or _of_plugin(word) is not None
-
-
-#: Words of laws; a rigid DOF has none.
-LAW_WORDS = _LawWords((*_BY_WORD, "rigid"))
+_BY_WORD: dict[str, type[JointLaw]] = {
+    word: getattr(import_module(f"jointfrf.laws.{module}"), name) for word, (module, name) in LAWS.items()
+}
 
 
 def _law_of(word: str) -> type[JointLaw]:
     """Return the law of a word; raises FileContentError where a plugin cannot be used."""
     if word in _BY_WORD:
         return _BY_WORD[word]
-    entry = _of_plugin(word)
+    entry = law_of_plugin(word)
     assert entry is not None  # checked where the word was read
 
     def is_law(found: type[JointLaw]) -> bool:
@@ -81,13 +59,13 @@ def _numbers(law: type[JointLaw]) -> tuple[LawField, ...]:
 
 def takes_in_words() -> str:
     """Return which parameters each law takes, for the reference of keys."""
-    return "; ".join(f"`{law.word}` {', '.join(f'`{one.name}`' for one in _numbers(law))}" for law in LAWS)
+    return "; ".join(f"`{law.word}` {', '.join(f'`{one.name}`' for one in _numbers(law))}" for law in _BY_WORD.values())
 
 
 def parameters_in_words() -> str:
     """Return what the parameters of all laws are, each as the first law that has it describes it."""
     by_name: dict[str, LawField] = {}
-    for law in LAWS:
+    for law in _BY_WORD.values():
         for number in _numbers(law):
             by_name.setdefault(number.name, number)
     return "; ".join(map(_in_words, by_name.values()))
@@ -135,6 +113,10 @@ class DofLawKeys(Keys):
     mass: Annotated[
         NotNegative | None, key("Mass of the joint in this direction, half of it on either side.", "kg, kg m^2")
     ] = None
+    per: Annotated[
+        Literal["m", "m^2"] | None,
+        key("Values are per length or area of a line or face.", absent="as the ends of the joint are"),
+    ] = None
 
 
 class LawJointKeys(Keys):
@@ -164,7 +146,7 @@ def _constants(table: TomlTable) -> Joint:
 
 def _laws(table: TomlTable) -> LawJoint:
     laws: dict[str | tuple[str, str], JointLaw] = {}
-    rigid, dofs, mass = [], [], {}
+    rigid, dofs, mass, per = [], [], {}, {}
     for own in read_keys(table, LawJointKeys).law:
         _check_law(own)
         about: str | tuple[str, str] = own.between or own.dof or ""
@@ -174,19 +156,21 @@ def _laws(table: TomlTable) -> LawJoint:
             dofs.append(own.dof)
             if own.mass is not None:
                 mass[own.dof] = own.mass
+            if own.per is not None:
+                per[own.dof] = own.per
         if own.law == "rigid":
             rigid.append(str(about))
         else:
             laws[about] = read_law(own.table.table("values"), own.law, is_cross=own.between is not None)
-    return table.build(lambda: LawJoint(laws, rigid, mass, dofs), "law")
+    return table.build(lambda: LawJoint(laws, rigid, mass, dofs, per), "law")
 
 
 def _check_law(own: DofLawKeys) -> None:
     """Raise a FileContentError unless the keys of a law go together."""
     if own.between is None and own.dof is None:
         raise own.missing(["dof"])
-    if own.between is not None and (own.law == "rigid" or own.dof is not None or own.mass is not None):
-        raise own.wrong("between", "a cross term has a law that is not rigid, no dof and no mass")
+    if own.between is not None and (own.law == "rigid" or own.dof or own.mass is not None or own.per):
+        raise own.wrong("between", "a cross term has a law that is not rigid, no dof, no mass and no per")
     if own.law == "rigid" and own.values:
         raise own.wrong("values", "a rigid DOF takes none")
 
@@ -223,7 +207,8 @@ def _text_of_laws(joint: LawJoint) -> str:
     for dof in joint.dofs:
         text = f"[[law]]\ndof = {json.dumps(dof)}\n"
         text += 'law = "rigid"\n' if dof in joint.rigid else _law_line(joint.laws[dof, dof])
-        parts.append(text + (f"mass = {masses[dof]!r}  # kg, kg m^2\n" if dof in masses else ""))
+        text += f"mass = {masses[dof]!r}  # kg, kg m^2\n" if dof in masses else ""
+        parts.append(text + (f"per = {json.dumps(joint.per[dof])}\n" if dof in joint.per else ""))
     for (a, b), law in joint.laws.items():
         if a != b:
             parts.append(f"[[law]]\nbetween = {json.dumps([a, b])}\n{_law_line(law)}")
@@ -271,7 +256,7 @@ def start_values(word: object) -> dict[str, float]:
 
 def _law_line(law: JointLaw) -> str:
     """Return word and values of a law as lines of TOML."""
-    if type(law) not in LAWS and not (_of_plugin(law.word) and type(law) is _law_of(law.word)):
+    if type(law) not in _BY_WORD.values() and not (law_of_plugin(law.word) and type(law) is _law_of(law.word)):
         raise ValueError(f"a {type(law).__name__} cannot be written to a file")
     values = ", ".join(f"{name} = {value!r}" for name, value in law.numbers().items())
     return f"law = {json.dumps(law.word)}\nvalues = {{ {values} }}\n"

@@ -12,14 +12,24 @@ from numpy.typing import ArrayLike
 
 from jointfrf.dofs import direction_places, is_rotation, parameter_name
 from jointfrf.joint import Joint
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_names, as_number, as_real, check_type
+from jointfrf.kernel.arguments import (
+    ComplexArray,
+    FloatArray,
+    as_frequency,
+    as_names,
+    as_number,
+    as_real,
+    check_choice,
+    check_type,
+)
 from jointfrf.kernel.call import OnSingular
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.laws.law import JointLaw, LawField
 from jointfrf.laws.springs import SpringLaw
 
 if TYPE_CHECKING:
-    from jointfrf.io.cards import CardFormat, CardOptions
+    from jointfrf.io.card_link import CardFormat
+    from jointfrf.io.cards import CardOptions
 
 __all__ = ["Connection", "JointQuantity", "LawJoint", "joined"]
 
@@ -76,11 +86,14 @@ class LawJoint:
         Mass of the joint by DOF, kg (rotations kg m^2); half of it moves with either side.
     dofs : sequence of str, optional
         Order of the DOFs; by default those of `laws`, then the rigid ones.
+    per : mapping of str to {"m", "m^2"}, optional
+        DOFs whose stiffness, damping and mass are per length or area, of a joint along a line or over a face.
 
     Raises
     ------
     ValueError
-        A DOF with two laws or none, a cross term with a rigid DOF, a mass that is not positive.
+        A DOF with two laws or none, a cross term with a rigid DOF or between a DOF per length and another, a mass that
+        is not positive.
 
     Examples
     --------
@@ -98,6 +111,7 @@ class LawJoint:
     rigid: tuple[str, ...]
     mass: Mapping[str, float]
     dofs: tuple[str, ...]
+    per: Mapping[str, str]
 
     def __init__(
         self,
@@ -105,6 +119,7 @@ class LawJoint:
         rigid: Sequence[str] = (),
         mass: Mapping[str, float] | None = None,
         dofs: Sequence[str] | None = None,
+        per: Mapping[str, str] | None = None,
     ) -> None:
         if not isinstance(laws, Mapping) or not isinstance(mass, Mapping | None):
             what = "mass" if isinstance(laws, Mapping) else "laws"
@@ -133,10 +148,17 @@ class LawJoint:
                 raise ValueError(f"mass names {dof!r}, which is no DOF of the joint ({', '.join(names)})")
             if value < 0:
                 raise ValueError(f"the mass of {dof} must not be negative, not {value:g}")
+        own = {dof: unit for dof in names if (unit := (per or {}).get(dof)) is not None}
+        for dof, unit in own.items():
+            check_choice(f"per of {dof}", unit, ("m", "m^2"))
+        for a, b in by_pair:
+            if own.get(a) != own.get(b):
+                raise ValueError(f"the cross term {a},{b} must be between two DOFs per the same length or area")
         object.__setattr__(self, "laws", by_pair)
         object.__setattr__(self, "rigid", tuple(rigid))
         object.__setattr__(self, "mass", masses)
         object.__setattr__(self, "dofs", names)
+        object.__setattr__(self, "per", own)
 
     @classmethod
     def of_joint(cls, joint: Joint) -> LawJoint:
@@ -168,13 +190,18 @@ class LawJoint:
         found = []
         for (a, b), law in self.laws.items():
             rotations = is_rotation(a) + is_rotation(b)
+            per = f" per {self.per[a]}" if a in self.per else ""
             for field, value in zip(law.fields, law.values.tolist(), strict=True):
-                found.append(JointQuantity(parameter_name(field.name, a, b), field, field.unit(rotations), value))
+                unit = field.unit(rotations) + (per if field.is_factor else "")
+                found.append(JointQuantity(parameter_name(field.name, a, b), field, unit, value))
         for dof, mass in self.mass.items():
-            found.append(
-                JointQuantity(parameter_name("m", dof, dof), _MASS, "kg m^2" if is_rotation(dof) else "kg", mass)
-            )
+            unit = ("kg m^2" if is_rotation(dof) else "kg") + (f" per {self.per[dof]}" if dof in self.per else "")
+            found.append(JointQuantity(parameter_name("m", dof, dof), _MASS, unit, mass))
         return tuple(found)
+
+    def with_units_per(self, per: Mapping[str, str]) -> LawJoint:
+        """Return the same joint with DOFs whose values are per ``"m"`` or ``"m^2"``."""
+        return LawJoint(self.laws, self.rigid, self.mass, self.dofs, per)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -271,6 +298,15 @@ class LawJoint:
             found.append((places, np.asarray(-(omega**2) / 2, np.complex128)))
         return found
 
+    def check_at_points(self, why: str) -> None:
+        """Raise a ValueError for a joint along a line or over a face."""
+        if self.per:
+            dof, unit = next(iter(self.per.items()))
+            raise ValueError(
+                f"the values of {dof} are per {unit}, and {why}: give each node its share of the length or area by "
+                "LawJoint with multiplied values"
+            )
+
     def constant_joint(self, freq_hz: float | None = None) -> Joint:
         """Return the joint of constant matrices that this is, or is at one frequency.
 
@@ -284,6 +320,7 @@ class LawJoint:
         ValueError
             A rigid DOF, a mass, or, without `freq_hz`, a law that depends on frequency.
         """
+        self.check_at_points("its constants are those of two points")
         if self.rigid or self.mass:
             what = f"{', '.join(self.rigid)} rigid" if self.rigid else f"a mass in {', '.join(self.mass)}"
             raise ValueError(f"a joint with {what} is not one of stiffness and damping alone")
@@ -311,13 +348,14 @@ class LawJoint:
 
         Parameters
         ----------
-        program : {"abaqus", "calculix", "nastran", "ansys"}
+        program : {"abaqus", "calculix", "nastran", "ansys", "code_aster", "lsdyna", "subdyn"}
         nodes : sequence of two int
             Nodes j on A and k on B.
         freq_hz : float, optional
             Where laws are taken that depend on frequency, where there are no tables: stiffness and hysteretic damping
             at that frequency. A comment says so.
         element, number, rotation_nodes, damping, full_matrix, positions, points, units, faces, comments, connector
+        damping_nodes
             As for `Joint.export`; no `positions` of a joint with masses.
         table_hz : array_like, optional
             Instead of `freq_hz`: laws as tables over these frequencies, as for `Joint.export`.
@@ -344,6 +382,7 @@ class LawJoint:
         102, 2, 1., 202, 2, -1.
         <BLANKLINE>
         """
+        self.check_at_points("cards connect two nodes")
         table_hz = options.get("table_hz")
         if table_hz is not None and freq_hz is not None:
             raise ValueError("freq_hz takes laws at one frequency, table_hz over many; name one of them")
@@ -359,7 +398,9 @@ class LawJoint:
                 if law.constant_terms is None
             ]
         )
-        comment = {"abaqus": "**", "calculix": "**", "nastran": "$", "ansys": "!"}.get(program, "")
+        from jointfrf.io.card_link import COMMENT_MARKS  # readers of files take their time to import
+
+        comment = COMMENT_MARKS.get(program, "")
         if self.mass and options.get("positions") is not None:
             raise ValueError("point masses are written at the nodes; leave positions out")
         note = f"{comment} {', '.join(varying)} at {freq_hz:g} Hz" if varying else ""
@@ -400,13 +441,14 @@ def _springs(
 
 def joined(joints: Mapping[str, LawJoint]) -> LawJoint:
     """Return several joints as one, none of which couples DOFs of two: its DOFs are named ``"mount.y"``."""
-    laws, rigid, mass, dofs = {}, list[str](), dict[str, float](), list[str]()
+    laws, rigid, mass, dofs, per = {}, list[str](), dict[str, float](), list[str](), dict[str, str]()
     for name, joint in joints.items():
         laws.update({(f"{name}.{a}", f"{name}.{b}"): law for (a, b), law in joint.laws.items()})
         rigid += [f"{name}.{dof}" for dof in joint.rigid]
         mass.update({f"{name}.{dof}": value for dof, value in joint.mass.items()})
         dofs += [f"{name}.{dof}" for dof in joint.dofs]
-    return LawJoint(laws, rigid, mass, dofs)
+        per.update({f"{name}.{dof}": unit for dof, unit in joint.per.items()})
+    return LawJoint(laws, rigid, mass, dofs, per)
 
 
 def _masses(
@@ -418,7 +460,9 @@ def _masses(
     values = set(mass.values())
     if len(values) > 1:
         raise ValueError(f"a point mass is the same in all directions: those of {', '.join(mass)} differ")
-    from jointfrf.io.cards import card_integer, card_real  # readers of files take their time to import
+    if program not in ("abaqus", "calculix", "nastran", "ansys"):
+        raise ValueError(f"point masses are not written for {program}; leave the mass out and add it there")
+    from jointfrf.io.card_link import card_integer, card_real  # readers of files take their time to import
 
     half = values.pop() / 2
     element, number = numbers

@@ -80,8 +80,10 @@ class SpringLaw(JointLaw):
 
     @classmethod
     def from_numbers(cls, numbers: Mapping[str, Any], *, is_cross: bool) -> Self:
-        """Return the spring that a file describes; `is_cross`: it couples two DOFs."""
-        return cls(**numbers, is_cross=is_cross)
+        """Return the spring that a file describes, with the damping that it names; `is_cross`: it couples two DOFs."""
+        named: dict[tuple[bool, bool], SpringDamping] = {(True, True): "both", (True, False): "hysteretic"}
+        damping = named.get(("h" in numbers, "c" in numbers), "viscous")
+        return cls(**numbers, damping=damping, is_cross=is_cross)
 
     def stiffness(self, omega: FloatArray) -> ComplexArray:
         """Return k + i h + i w c, shape (n_freq,)."""

@@ -20,11 +20,12 @@ MESSAGES: Mapping[str, Message] = {**DATA_MESSAGES, **FIT_MESSAGES}
 
 #: Warnings that put the whole fit in doubt, the worst first; then the warnings about single numbers.
 _WORST = (
-    "amplitude-dependent", "amplitude-not-smooth", "channel-changed", "channel-change-ambiguous", "not-converged",
+    "amplitude-dependent", "amplitude-not-smooth", "channel-changed", "channel-change-ambiguous",
+    "channel-inconsistent", "not-converged",
     "second-minimum", "residual-large", "compliance-scatter", "lines-rejected", "dof-left-out", "cross-terms-ignored",
     "compliance-unsymmetric", "damping-negative", "frequency-dependent", "band-parts-differ", "band-scatter",
-    "set-up-deviation", "set-up-scatter", "model-error", "prior-contradicted", "direction-undetermined",
-    "joints-not-separated", "stiffness-unbounded", "stiffness-zero", "poorly-determined",
+    "moving-mass", "off-axis", "set-up-deviation", "set-up-scatter", "model-error", "model-gain", "prior-contradicted",
+    "direction-undetermined", "joints-not-separated", "stiffness-unbounded", "stiffness-zero", "poorly-determined",
 )  # fmt: skip
 _OLD = "saved-by-older-version"
 

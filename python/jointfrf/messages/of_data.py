@@ -10,7 +10,9 @@ from jointfrf.messages.message import Message
 __all__ = ["DATA_MESSAGES", "FATAL_CODES"]
 
 #: Errors with which no fit is meaningful: `identify` stops, unless they are accepted.
-FATAL_CODES: Final = ("quantity", "driving-point-sign", "time-convention", "phase-unit", "unsigned-phase", "decibel")
+FATAL_CODES: Final = (
+    "quantity", "driving-point-sign", "gyroscopic", "time-convention", "phase-unit", "unsigned-phase", "decibel",
+)  # fmt: skip
 
 #: How far a channel is from the rigid motion of its neighbours.
 _DIFFERS = "it differs by {error:.3p} from the rigid motion of {neighbours} neighbours, which agree to {rest:.2p}"
@@ -207,6 +209,30 @@ DATA_MESSAGES: Final[Mapping[str, Message]] = {
         do="Change the direction of the channel, for example `102:-y` instead of `102:+y`. Reciprocity does not show "
         "whether the response or the force is reversed.",
     ),
+    "driving-point-residues": Message(
+        "warning",
+        {
+            "": "{about} is no driving point: residues are positive at {positive} Hz, negative at {negative} Hz",
+            "proposed": "{about} is no driving point: residues are positive at {positive} Hz, negative at {negative} "
+            "Hz; {others} have one sign in all {modes} modes",
+        },
+        "Check where the force acts",
+        means="At the driving point the residue of each mode is the square of its shape, so all have one sign. These "
+        "do not: the force acts elsewhere, or two sensors are exchanged.",
+        why="The point of the force is numbered wrongly, points are counted from 0 or along another direction, or a "
+        "sensor near it was exchanged.",
+        do="Compare with notes and photographs of the test. If the message proposes responses, the force may act at "
+        "one of these: name it so, and run the check again. The check needs three clear resonances and one force; a "
+        "smooth background does not change it.",
+    ),
+    "gyroscopic": Message(
+        "error",
+        "h_pq = -h_qp between {about} and the other channels, although every driving point has the right sign",
+        "Use reciprocal=False if a part rotates; otherwise check the signs of these channels",
+        means="The FRFs are antisymmetric between two groups of channels, as with a rotor measured in two directions.",
+        why="Gyroscopic forces of a rotating part. The fit assumes a reciprocal structure by default.",
+        do="Give `reciprocal=False` to `identify`. If no part rotates, check the axes of these channels.",
+    ),
     "channel-sign": Message(
         "error",
         "{about} is {factor:.3g} times the expected motion: " + _DIFFERS,
@@ -227,6 +253,15 @@ DATA_MESSAGES: Final[Mapping[str, Message]] = {
         means="One channel, or one side, differs from the other ones by a factor that a unit explains.",
         why="A sensor was calibrated in g, a coordinate or rotation is in mm or degrees, or forces are in lbf.",
         do="State the unit of the channel when you read the file, or correct its calibration.",
+    ),
+    "channel-inconsistent": Message(
+        "warning",
+        "h_pq and h_qp of {about} differ by {scatter:.2p}, of all other channels by {others:.1p} at most; no gain or "
+        "delay explains this",
+        "Measure {about} again: an average may come from another point or direction, or a sensor is loose",
+        means="FRFs of one DOF contradict the reciprocity of the structure, smoothly over frequency.",
+        why="One of the averaged impacts was at another point, at an angle or double, or a sensor is loose.",
+        do="Measure the row and the column of this DOF again, or leave it out.",
     ),
     "channel-gain": Message(
         "warning",

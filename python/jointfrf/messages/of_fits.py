@@ -25,6 +25,8 @@ FIT_MESSAGES: Final[Mapping[str, Message]] = {
             "the "
             "data",
             "model": "models and joint do not fit the FRFs: residual {ratio:.3g} times the noise, {where}",
+            "model-failed": "no convergence, because models and joint do not fit the FRFs: residual "
+            "{ratio:.3g} times the noise, {where}. No value or interval is valid",
             "model-uncovered": "models and joint do not fit the FRFs: residual {ratio:.3g} times the noise, {where}. "
             "The intervals do not cover this error",
         },
@@ -35,6 +37,7 @@ FIT_MESSAGES: Final[Mapping[str, Message]] = {
             "per-part": "Give the noise of real and imaginary part together, 1.41 times the noise of each part",
             "laws": "Try another law",
             "model": "Check the models in these bands and channels",
+            "model-failed": "Check models, clamps, added masses and channels; start with fewer bands",
             "model-uncovered": "Check the models there, or give them an error (model_error)",
         },
         means="The joint, with the parameters found, leaves more than noise of the FRFs. The parameters may be "
@@ -246,7 +249,11 @@ FIT_MESSAGES: Final[Mapping[str, Message]] = {
     ),
     "band-parts-differ": Message(
         "warning",
-        "{parameter} differs between parts of the band: {values}; the interval covers this",
+        {
+            "": "{parameter} differs between parts of the band: {values}; the interval covers this",
+            "pair": "{parameter} differs between parts of the band, most between {one} and {other} ({values}); the "
+            "interval covers this",
+        },
         "Look for flexible sides, a missing DOF, or a law of frequency",
         means="Parts of the band, fitted separately, give values that disagree by more than their noise.",
         why="The joint as described does not fit in the whole band.",
@@ -360,6 +367,39 @@ FIT_MESSAGES: Final[Mapping[str, Message]] = {
         why="Calibration factors of sensors and hammer, mounting of sensors, or filters.",
         do="Calibrate the channels to narrow the intervals. If sensors resonate, mount them with a stud or glue.",
     ),
+    "moving-mass": Message(
+        "warning",
+        {
+            "": "h_pq and h_qp differ as if a mass of {mass:.3g} kg ({error:.1g} kg) moves from point to point with "
+            "the {where}; it was removed",
+            "given": "the mass of {mass:.3g} kg that moves with the {where} was removed",
+            "contradicted": "the mass of {mass:.3g} kg was removed, but h_pq and h_qp show {shown:.3g} kg; a "
+            "negative mass moves with the excitation",
+        },
+        {
+            "": "State the mass of the sensor (--sensor-mass; sensor_mass), or 0 if none moves",
+            "given": "Check that only this mass moves",
+            "contradicted": "State the mass in kg, or omit the option: then `identify` estimates the mass",
+        },
+        means="A sensor of this mass lowers the resonances of one row or column of FRFs at a time. The fit "
+        "and its figures use FRFs of the structure without it. The value in brackets is the standard error.",
+        why="A roving accelerometer, or an impedance head that moves with the shaker.",
+        do="Compare with the mass of your sensor. Mount equal masses at all points, or use a lighter sensor.",
+    ),
+    "off-axis": Message(
+        "warning",
+        {
+            "": "the FRFs of {about} contain {share:.2p} ({error:.1p}) of FRFs of {dof}, impact less sensor; half of "
+            "the difference was removed from rows and from columns",
+        },
+        {"": "Align impacts and sensors, or state their directions"},
+        means="The FRFs of a channel contain a share of FRFs of another joint DOF: h_pq and h_qp differ by it. The "
+        "FRFs do not show whether the impact or the sensor is off axis, so that intervals contain an error of the same "
+        "size. The channel with the largest share is named. The value in brackets is the standard error. If the "
+        "shares add less than noise to all standard errors, the finding is a note.",
+        why="An impact at an angle to its axis; sensors are glued at an angle, or sensors have cross-axis sensitivity.",
+        do="Hit along the axis, use an impact guide or a shaker, and measure the directions of sensors.",
+    ),
     "set-up-deviation": Message(
         "note",
         {
@@ -402,14 +442,32 @@ FIT_MESSAGES: Final[Mapping[str, Message]] = {
             "given": "intervals cover errors of the models up to {level:.2p} of their modal stiffnesses and masses, "
             "as "
             "given or not excluded",
+            "both": "intervals cover errors of modal stiffnesses and masses up to {level:.2p}, and of a common "
+            "gain up to {gain:.2p}, as given or not excluded",
+            "gain": "intervals cover errors of a common gain of all FRFs up to {gain:.2p}, as given or not excluded",
             "large": "with models off by {level:.2p} of modal stiffnesses and masses, the residual is {ratio:.3g} "
             "times "
             "the noise: intervals cover this in part",
+            "far": "models and FRFs differ by {level:.2p} of modal stiffnesses and masses, {shapes:.2p} of mode "
+            "shapes, and {noise:.3g} times the noise: intervals cover this",
         },
-        "Update the models of the parts, or declare more of their parameters unknown",
+        {
+            "": "Update the models of the parts, or declare more of their parameters unknown",
+            "gain": "To narrow them, calibrate sensors and hammer (response_gains, force_gains)",
+        },
         means="The models of the parts do not agree with the FRFs within noise, apart from their unknown parameters.",
         why="Mesh, material, missing details, or boundary conditions of the models.",
         do="Test the parts alone and update their models, or declare density and stiffness as unknown.",
+    ),
+    "model-gain": Message(
+        "warning",
+        "with the models, the FRFs show gains other than 1: {gains}; intervals cover this",
+        "Calibrate these sensors and the hammer, or declare the gains unknown (response_gains, force_gains)",
+        means="All FRFs of a response or of a force, or all FRFs, are too large or too small by one factor. The fit "
+        "takes the factor as an error with a variance that the FRFs show.",
+        why="A sensitivity is wrong or old. A wrong mass of all parts looks the same.",
+        do="Calibrate the sensor and the hammer with a known mass. If they are right, check density and mass of the "
+        "models.",
     ),
     "prior-contradicted": Message(
         "warning",
@@ -530,12 +588,13 @@ FIT_MESSAGES: Final[Mapping[str, Message]] = {
     # ------------------------------------------------------------ levels
     "amplitude-not-smooth": Message(
         "warning",
-        "left out: K* of {about} is no smooth function of amplitude from {low:.2g} to {high:.2g} (chance "
-        "{chance:.1g})",
-        "Test with response control, or at more levels",
-        means="The stiffness of one test changes with amplitude in a way that no cubic in ln a explains.",
-        why="The amplitude changes too much over the lines, or the joint jumps between two states.",
-        do="Keep the motion constant over the lines (response control), and use more levels.",
+        "K* of {about} is no smooth function of amplitude from {low:.2g} to {high:.2g} (chance {chance:.1g}): "
+        "intervals are wider, and cover K* over these amplitudes",
+        "Test with response control, or check the models",
+        means="On classes of amplitude within one test, K* departs from a cubic in ln a by more than noise.",
+        why="The amplitude changes too much over the lines, the joint slips suddenly, or the models have an error that "
+        "changes with frequency.",
+        do="Keep the motion constant over the lines (response control), use narrower bands, or correct the models.",
     ),
     "law-misfit": Message(
         "warning",
@@ -572,6 +631,65 @@ FIT_MESSAGES: Final[Mapping[str, Message]] = {
         why="The frequency belongs to another mode, or the models contain more damping than the assembly.",
         do="Compare the mode shape, and check density and damping of the parts.",
     ),
+    # ------------------------------------------------------------ free decays
+    "decay-not-smooth": Message(
+        "warning",
+        "left out: {count} levels of {about} from {first:.4g} to {last:.4g} s, whose envelope is not smooth",
+        "Narrow the filter (--bandwidth), or begin later (--start)",
+        means="Amplitude and phase of a filtered decay are no smooth functions of time.",
+        why="Two close modes beat in the pass-band, the structure was touched again, or a sensor moved.",
+        do="Look at the envelope. Use a filter that separates the modes, or an impact at the node of one of them.",
+    ),
+    "decay-not-damped": Message(
+        "warning",
+        "left out: {count} levels of {about} from {first:.4g} to {last:.4g} s, in which the amplitude does not "
+        "significantly fall",
+        "Begin after the last impact (--start)",
+        means="A free decay loses amplitude. This one does not, or the noise hides it.",
+        why="A shaker or a second impact drives the mode, two close modes beat, or the noise is too large.",
+        do="Begin where nothing drives the structure.",
+    ),
+    "decay-of-several-modes": Message(
+        "warning",
+        "left out: {count} levels of {about} from {first:.4g} to {last:.4g} s, where the mode at {other:.4g} Hz moves "
+        "the sensors {share:.2g} times as much",
+        "Excite one mode",
+        means="Another mode moves the structure nearly as much as this one, so the joint has no single amplitude.",
+        why="An impact excites all modes of its band.",
+        do="Use a softer tip, release the structure in the shape of one mode, or stop a shaker at its resonance.",
+    ),
+    "decay-sensors-disagree": Message(
+        "warning",
+        "damping of {about} differs by {spread:.2g} % between sensors, more than noise explains",
+        "Check the sensors, and look for a close mode",
+        means="Sensors of one decaying mode see the same rate. Intervals contain their scatter.",
+        why="A close mode lies in the pass-band, a sensor is loose or non-linear, or the mode changes its shape.",
+        do="Narrow the filter, or leave out a sensor.",
+    ),
+    "decay-levels-scatter": Message(
+        "warning",
+        "damping of {about} scatters by {spread:.2g} % about any smooth law over amplitude",
+        "Look for a close mode, and use sensors at which the two differ",
+        means="Frequency and damping of a mode change smoothly with its amplitude. Intervals contain the scatter.",
+        why="Two close modes beat, or the structure was touched while it rang.",
+        do="Use a filter that separates the modes, or excite one of them.",
+    ),
+    "decay-sensor-unnamed": Message(
+        "note",
+        "not used, because no DOF of the models is named for them: {about}",
+        "",
+        means="The motion in the joint cannot be computed from a sensor whose DOF is unknown.",
+        why="Its column is no DOF of the models, and [channels] and --sensors do not name it.",
+        do="Name its DOF.",
+    ),
+    "decay-shape": Message(
+        "warning",
+        "the sensors do not move as {about} of the models does: MAC {mac:.2f}",
+        "Check which DOF each sensor is, and which mode this is",
+        means="The measured mode shape differs from the shape of the models with the joint found.",
+        why="A sensor has another place, direction or calibration, or the mode is another one.",
+        do="Compare the shape at each sensor.",
+    ),
     # ------------------------------------------------------------ pools
     "fit-not-pooled": Message(
         "warning",
@@ -596,6 +714,16 @@ FIT_MESSAGES: Final[Mapping[str, Message]] = {
         means="Mean and spread are of the values, not of their logarithms.",
         why="An interval reaches zero.",
         do="Nothing is wrong.",
+    ),
+    "errors-shared": Message(
+        "warning",
+        "{about} of the fits agree better than their errors allow (chance {chance:.1g}): {share:.2p} of the variance "
+        "is taken as one error of all fits",
+        "State the error that all fits share (--common)",
+        means="The fits scatter less than independent errors of this size would.",
+        why="A part of each error is the same in all fits, such as a calibration or a wrong modulus of a model. Or the "
+        "intervals of the fits are too wide.",
+        do="Find the error that all fits share, and state it by `--common`. The mean is not known better than this.",
     ),
     "outlying-assembly": Message(
         "warning",

@@ -291,13 +291,15 @@ class Modes:
             np.ascontiguousarray(self.shapes_out),
             np.ascontiguousarray(self.shapes_in),
         )
-        result, status = run("receptance_modal", args, shape, {"omega": omega}, freq_hz, on_singular, 0.0, out)
-        rcond = np.where(status.rcond < SINGULAR, status.rcond, 1.0)
+        result, line_info, found = run(
+            "receptance_modal", args, shape, {"omega": omega}, freq_hz, on_singular, 0.0, out
+        )
+        rcond = np.where(found < SINGULAR, found, 1.0)
         known = self.uncertainty > 0
         complex_stiffness = self.stiffness[known] * (1 + 1j * self.loss_factor[known])
         left = complex_stiffness + omega[:, None] * (1j * self.damping[known] - omega[:, None])
         rcond = np.minimum(rcond, mode_condition(left, self.uncertainty[known]))
-        return result, LineStatus(status.line_info, rcond)
+        return result, LineStatus(line_info, rcond)
 
 
 def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> tuple[Modes, RigidModes]:

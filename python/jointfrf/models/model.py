@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,14 +18,17 @@ from jointfrf.laws.law_joint import LawJoint
 from jointfrf.models.matrices import Matrix, ModelMatrices
 from jointfrf.models.receptance import ReceptanceMethod, receptance
 
-__all__ = ["Ground", "Model", "assemble", "chain", "shift_of"]
+__all__ = ["Ground", "Model", "assemble", "chain", "shift_of", "with_modal_damping"]
 
 #: Up to this size all modes are computed, beyond it only those asked for.
 _DENSE_LIMIT = 50
 #: Modes are those about minus this share of the mean w^2 of single DOFs: below zero, so that K - shift M is regular for
 #: a free structure, too, and so far that its condition leaves eight digits (at 1 Hz it left five).
 _SHIFT = 1e-8
+#: A model has at most so many rigid-body motions; theirs are frequencies below this share of the next ones.
+_RIGID, _ELASTIC = 6, 1e-3
 Ground = Literal["none", "start", "end", "both"]
+_Model = TypeVar("_Model", bound="Model")
 
 
 @dataclass(frozen=True)
@@ -182,6 +185,48 @@ class Model:
         return freq, shapes[:, order]
 
 
+def with_modal_damping(model: _Model, ratios: ArrayLike) -> _Model:
+    """Return a model with viscous damping of its modes.
+
+    Parameters
+    ----------
+    model : Model
+    ratios : array_like, shape (n,)
+        Damping ratios of its lowest elastic modes; those beyond have none of it.
+
+    Returns
+    -------
+    Model
+        The same type, with a full matrix C = M Phi diag(2 zeta omega) Phi^T M added to the damping that it has.
+
+    Raises
+    ------
+    ValueError
+        A negative ratio, more ratios than elastic modes.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> model = jf.with_modal_damping(jf.chain([1.0, 1.0], [100.0], ground="none"), [0.01])
+    >>> c, (freq, shapes) = model.damping, model.modes()
+    >>> np.round(abs(np.diagonal(shapes.T @ c @ shapes)) / (4 * np.pi * freq[1]), 6).tolist()
+    [0.0, 0.01]
+    """
+    check_type("model", model, Model)
+    zeta = as_real("ratios", ratios, (None,))
+    if (zeta < 0).any():
+        raise ValueError(f"ratios must not be negative, not {zeta.min():g}")
+    freq, shapes = model.modes(min(zeta.size + _RIGID, len(model.dofs)))
+    elastic = freq > _ELASTIC * max(freq.max(initial=0.0), np.finfo(float).tiny)
+    freq, shapes = freq[elastic][: zeta.size], shapes[:, elastic][:, : zeta.size]
+    if freq.size < zeta.size:
+        raise ValueError(f"ratios names {zeta.size} modes; the model has {freq.size} elastic ones")
+    moved = np.asarray(model.mass @ shapes)
+    c = moved * (4 * np.pi * freq * zeta) @ moved.T
+    own: Any = 0.0 if model.damping is None else model.damping
+    return replace(model, damping=np.asarray(c + (own.toarray() if sparse.issparse(own) else own)))
+
+
 def shift_of(k: Matrix, m: Matrix) -> float:
     """Return where K - shift M is regular and well-conditioned for a free structure, too, (rad/s)^2."""
     return -_SHIFT * float(abs(k.diagonal()).sum() / max(abs(m.diagonal()).sum(), 1e-300))
@@ -277,7 +322,7 @@ def _constants(joint: Joint | LawJoint) -> tuple[Joint, FloatArray]:
     varying = [type(law).__name__ for law in joint.laws.values() if law.constant_terms is None]
     if varying:
         raise ValueError(f"joint: a {varying[0]} depends on frequency, which matrices do not; use couple")
-    springs = LawJoint(joint.laws, dofs=joint.dofs).constant_joint()
+    springs = LawJoint(joint.laws, dofs=joint.dofs, per=joint.per).constant_joint()
     return springs, np.array([joint.mass.get(dof, 0.0) for dof in joint.dofs])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,11 +14,51 @@ from jointfrf.dofs import DIRECTIONS, direction_places, rigid_motion
 from jointfrf.kernel.arguments import FloatArray, as_positive, as_real, check_choice, check_type, one_line
 from jointfrf.models.model import Model
 
-__all__ = ["Coupling", "PointModel", "PointPatch", "couple_points", "rigid_body"]
+__all__ = ["Coupling", "PointModel", "PointPatch", "Region", "couple_points", "rigid_body"]
 
 Coupling = Literal["rigid", "distributing"]
 #: A motion is not held by a patch where its nodes see less than this share of the motion that they see most of.
 _HELD = 1e-6
+#: Two regions are of one size where their meshes differ by no more than this share.
+_SAME_SIZE = 0.01
+
+
+class Region(NamedTuple):
+    """A line or a face of a model on which a joint acts per length or area.
+
+    Attributes
+    ----------
+    per : {"m", "m^2"}
+        Whether it is a line or a face.
+    size : float
+        Its length, m, or area, m^2.
+    centre : ndarray, shape (3,)
+        m.
+    terms : int
+        How many polynomials describe the motion there.
+    extent : ndarray, shape (3,)
+        Along the axes, m.
+    """
+
+    per: Literal["m", "m^2"]
+    size: float
+    centre: FloatArray
+    terms: int
+    extent: FloatArray
+
+    def __str__(self) -> str:
+        return (
+            f"{'a line' if self.per == 'm' else 'a face'} of {self.size:.4g} {self.per} with {self.terms} polynomials"
+        )
+
+    def matches(self, other: Region) -> bool:
+        """Whether both describe motions of lines or faces of one size by the same polynomials."""
+        is_alike = self.per == other.per and self.terms == other.terms
+        return is_alike and bool(np.isclose(self.size, other.size, rtol=_SAME_SIZE))
+
+    def ports(self, name: str, direction: str) -> tuple[str, ...]:
+        """Return the names of the coefficients of the motion in a direction, by the name of the region."""
+        return tuple(f"{name}~{i}:{direction}" for i in range(self.terms))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,10 +71,20 @@ class PointModel(Model):
         Nodes and reference points, m.
     shown : mapping of str to sparse array, shape (1, n)
         Motions that are no DOFs, by names like DOFs, ``"tip:theta_x"``: weights of the DOFs.
+    regions : mapping of str to Region
+        Lines and faces on which joints act per length or area; their ports are among `shown`.
     """
 
     places: Mapping[str, FloatArray] = field(default_factory=dict)
     shown: Mapping[str, sparse.csr_array] = field(default_factory=dict)
+    regions: Mapping[str, Region] = field(default_factory=dict)
+
+    def region_ports(self, dof: str) -> tuple[str, ...]:
+        """Return the ports of a region by the end of a joint, ``"weld:z"``; none for other DOFs."""
+        check_type("dof", dof, str)
+        name, _, direction = dof.rpartition(":")
+        found = self.regions[name].ports(name, direction) if name in self.regions else ()
+        return found if set(found) <= self.shown.keys() else ()
 
     def ports(self, *names: str) -> list[int] | sparse.csr_array:
         """Return DOFs, or weights where a motion is shown that is none, as `jointfrf.receptance` takes them.

@@ -345,7 +345,8 @@ def _solve_stored(
         args += [0, np.zeros((1, width))] if matrix is None else [n, matrix]
     args += [matrices.loss_factor, outputs, inputs]
     routine = "receptance" if how == "dense" else "receptance_banded"
-    return run(routine, args, shape, {"omega": omega}, task.freq_hz, task.on_singular, 0.0, out)
+    result, line_info, rcond = run(routine, args, shape, {"omega": omega}, task.freq_hz, task.on_singular, 0.0, out)
+    return result, LineStatus(line_info, rcond)
 
 
 def _solve_sparse(task: _Task) -> tuple[ComplexArray, LineStatus, str]:

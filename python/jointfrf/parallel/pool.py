@@ -207,8 +207,8 @@ def _end_with(sentinel: int) -> None:
 
 
 @contextmanager
-def one_thread() -> Iterator[None]:
-    """Limit BLAS and OpenMP to one thread inside a `with` block; then return to what was there.
+def one_thread(*, of_blas_only: bool = False) -> Iterator[None]:
+    """Limit BLAS and OpenMP, or BLAS only, to one thread inside a `with` block; then return to what was there.
 
     Notes
     -----
@@ -220,7 +220,7 @@ def one_thread() -> Iterator[None]:
     import jointfrf.kernel.call  # noqa: F401  # its libraries are loaded before they are looked for
 
     libraries = ThreadpoolController().lib_controllers
-    own = [(one, int(one.get_num_threads())) for one in libraries if one.user_api == "openmp"]
+    own = [(one, int(one.get_num_threads())) for one in libraries if one.user_api == "openmp" and not of_blas_only]
     for library, _ in own:
         library.set_num_threads(1)
     _enter([one for one in libraries if one.user_api != "openmp"])

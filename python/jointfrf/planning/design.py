@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from jointfrf.kernel.arguments import FloatArray
 
-__all__ = ["Criterion", "Design", "Designer", "Prices", "criterion_of"]
+__all__ = ["Criterion", "Design", "Designer", "Prices", "best_first", "criterion_of", "loss_of"]
 
 #: What is made small: the mean variance of relative errors ("A"), the volume of their ellipsoid ("D"), one variance.
 Criterion = Literal["A", "D"]
 
-#: An exchange must lower the logarithm of the criterion by more than rounding.
-_GAIN = 1e-9
+#: Designs are equally good if the logarithms of their criteria differ by less, errors by 5e-6: far above rounding,
+#: which differs between processors, and far below any difference that matters. Reciprocity makes such pairs.
+_TIE = 1e-5
 #: Exchanges that end nowhere: each lowers the criterion, so that this many are never needed.
 _EXCHANGES = 200
 
@@ -43,14 +44,32 @@ def criterion_of(targets: NDArray[np.intp], kind: Criterion) -> Callable[[FloatA
 
     def loss(information: FloatArray) -> FloatArray:
         with np.errstate(all="ignore"):
-            covariance = np.linalg.inv(information)[..., targets[:, None], targets]
-            if kind == "D":
-                found = np.linalg.slogdet(covariance)[1] / len(targets)
-            else:
-                found = np.log(np.trace(covariance, axis1=-2, axis2=-1) / len(targets))
-        return np.asarray(np.where(np.isfinite(found), found, np.inf))
+            return loss_of(np.asarray(np.linalg.inv(information)[..., targets[:, None], targets]), kind)
 
     return loss
+
+
+def loss_of(covariance: FloatArray, kind: Criterion) -> FloatArray:
+    """Return the logarithm of the size of an error, per parameter, by its covariance, shape (..., t, t)."""
+    with np.errstate(all="ignore"):
+        if kind == "D":
+            found = np.linalg.slogdet(covariance)[1] / covariance.shape[-1]
+        else:
+            found = np.log(np.trace(covariance, axis1=-2, axis2=-1) / covariance.shape[-1])
+    return np.asarray(np.where(np.isfinite(found), found, np.inf))
+
+
+def best_first(designs: Iterable[Design], loss: Callable[[Design], float]) -> Iterator[Design]:
+    """Yield designs by rising loss; of those as good as the best that is left, the first in the given order."""
+    rest = [(loss(one), one) for one in designs]
+    while rest:
+        least = min(size for size, _ in rest)
+        at = next(i for i, (size, _) in enumerate(rest) if not size > least + _TIE)
+        yield rest.pop(at)[1]
+
+
+def _loss(design: Design) -> float:
+    return design.loss
 
 
 @dataclass(frozen=True)
@@ -91,27 +110,33 @@ class Designer:
         while True:
             design = self._exchanged(design)
             yield design
-            grown = list(self.additions(design))
+            grown = self.ranked(design, self.additions(design))
             if not grown:
                 return
-            design = max(grown, key=lambda one: (design.loss - one.loss) / self._price(design, one))
+            design = grown[0]
 
-    def _price(self, one: Design, more: Design) -> float:
-        return self.prices.sensor if len(more.sensors) > len(one.sensors) else self.prices.hit
+    def ranked(self, design: Design, grown: Iterable[Design]) -> list[Design]:
+        """Return designs with one more channel than another design, the most useful for its price first."""
+
+        def change(more: Design) -> float:
+            price = self.prices.sensor if len(more.sensors) > len(design.sensors) else self.prices.hit
+            return (more.loss - design.loss) / price
+
+        return list(best_first(grown, change))
 
     def _first(self) -> Design:
         """Return what is kept, with the best sensor and the best hit where there is none."""
         sensors = [self.kept.sensors] if self.kept.sensors else [(o,) for o in range(self.of_frf.shape[0])]
         hits = [self.kept.hits] if self.kept.hits else [(i,) for i in range(self.of_frf.shape[1])]
         pairs = [(own, other) for own in sensors for other in hits]
-        return min(self._judged(pairs), key=lambda one: one.loss)
+        return next(best_first(self._judged(pairs), _loss))
 
     def _judged(self, pairs: list[tuple[tuple[int, ...], tuple[int, ...]]]) -> list[Design]:
         each = np.array([self.of_frf[np.ix_(*pair)].sum(axis=(0, 1)) for pair in pairs])
         return [Design(*pair, float(loss)) for pair, loss in zip(pairs, self.loss(self.prior + each), strict=True)]
 
     def additions(self, design: Design) -> Iterator[Design]:
-        """Yield the design with each further sensor, and with each further hit."""
+        """Yield the design with each further sensor, and with each further impact."""
         now = self.information(design)
         rows = [o for o in range(self.of_frf.shape[0]) if o not in design.sensors]
         columns = [i for i in range(self.of_frf.shape[1]) if i not in design.hits]
@@ -135,8 +160,8 @@ class Designer:
     def _exchanged(self, design: Design) -> Design:
         """Return a design of the same size that no exchange of one sensor or one hit makes better."""
         for _ in range(_EXCHANGES):
-            better = min(self._swaps(design), key=lambda one: one.loss, default=design)
-            if not better.loss < design.loss - _GAIN:
+            better = next(best_first(self._swaps(design), _loss), design)
+            if not better.loss < design.loss - _TIE:
                 break
             design = better
         return design
@@ -148,13 +173,13 @@ class Designer:
             if out in self.kept.sensors:
                 continue
             losses = self.loss(now - rows[out] + rows)
-            for o in set(range(len(rows))) - set(design.sensors):
+            for o in sorted(set(range(len(rows))) - set(design.sensors)):
                 yield Design(_replaced(design.sensors, out, o), design.hits, float(losses[o]))
         for out in design.hits:
             if out in self.kept.hits:
                 continue
             losses = self.loss(now - columns[out] + columns)
-            for i in set(range(len(columns))) - set(design.hits):
+            for i in sorted(set(range(len(columns))) - set(design.hits)):
                 yield Design(design.sensors, _replaced(design.hits, out, i), float(losses[i]))
 
 

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from jointfrf.frf.bands import Band
+from jointfrf.frf.stated_noise import StatedNoise
 from jointfrf.identification.model.assembly import Assembly
+from jointfrf.identification.model.evidence import GAIN, ErrorGroup, error_terms, expected_covariance
 from jointfrf.identification.model.prediction import Prediction, parameter_vector
 from jointfrf.identification.model.prepare import Channels
 from jointfrf.identification.parameters import FitParameter, ParameterVector
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_not_negative, as_positive
 
-__all__ = ["ExpectedNoise", "FrfInformation", "PlannedTest", "expected_noise", "narrowest_band"]
+__all__ = ["ErrorInformation", "FrfInformation", "PlannedTest", "expected_noise", "narrowest_band"]
 
 #: Bytes of derivatives that are in memory at once.
 _BYTES = 256 * 2**20
@@ -27,37 +30,17 @@ _ROUNDING = 1e-10
 _BAND = 0.9
 
 
-@dataclass(frozen=True)
-class ExpectedNoise:
-    """Noise that a test will have.
-
-    Attributes
-    ----------
-    level : float
-        Standard deviation of one average relative to the FRF.
-    floor : float
-        Standard deviation of one average of the accelerance, m/(s^2 N).
-    averages : float
-    """
-
-    level: float
-    floor: float
-    averages: float
-
-    def variance(self, omega: FloatArray, h: ComplexArray) -> FloatArray:
-        """Return E|e|^2 of receptances, shape (n_freq, n_o, n_i), (m/N)^2."""
-        of_floor = (self.floor / omega**2)[:, None, None]
-        found: FloatArray = ((self.level * abs(h)) ** 2 + of_floor**2) / self.averages
-        return found
-
-
-def expected_noise(noise: float, floor: float, averages: float) -> ExpectedNoise:
-    """Return the noise of a test; raises ValueError for numbers that no noise has, as in `plan`."""
-    level, constant = as_not_negative("noise", noise), as_not_negative("floor", floor)
-    found = ExpectedNoise(level, constant, as_positive("averages", averages))
-    if not found.level + found.floor:
+def expected_noise(noise: float | StatedNoise, floor: float, averages: float) -> StatedNoise:
+    """Return the noise of the mean of averages; raises ValueError for numbers that no noise has, as in `plan`."""
+    constant, count = as_not_negative("floor", floor), as_positive("averages", averages)
+    if isinstance(noise, StatedNoise):
+        if constant:
+            raise ValueError(f"floor {constant:g} and floors of noise are both given; leave out floor")
+        return noise.of_mean(count)
+    level = as_not_negative("noise", noise)
+    if not level + constant:
         raise ValueError("noise and floor are both zero; give one of them")
-    return found
+    return StatedNoise(level, accelerance=constant).of_mean(count)
 
 
 def narrowest_band(freq_hz: FloatArray, share: FloatArray) -> Band:
@@ -120,6 +103,29 @@ def _scale(parameters: tuple[FitParameter, ...]) -> FloatArray:
 
 
 @dataclass(frozen=True)
+class ErrorInformation:
+    """Fisher information of relative changes of the parameters, and of errors of the models.
+
+    Attributes
+    ----------
+    of_frf : ndarray, shape (n_o, n_i, p + e, p + e)
+        Information of each FRF over all lines, error terms in units of their deviations at a level of 1.
+    prior : ndarray, shape (p, p)
+    groups : list of ErrorGroup
+        All errors in their order.
+    """
+
+    of_frf: FloatArray
+    prior: FloatArray
+    groups: list[ErrorGroup]
+
+    def covariance(self, responses: Sequence[int], forces: Sequence[int]) -> FloatArray:
+        """Return the covariance of relative errors, as a fit of these FRFs will state it."""
+        own = self.of_frf[np.ix_(responses, forces)].sum(axis=(0, 1))
+        return expected_covariance(own, self.prior, self.groups)
+
+
+@dataclass(frozen=True)
 class PlannedTest:
     """An assembly as it is expected, and the noise of a test on it.
 
@@ -128,14 +134,14 @@ class PlannedTest:
     assembly : Assembly
     freq_hz : ndarray, shape (n_freq,)
         Lines above 0 Hz.
-    noise : ExpectedNoise
+    noise : StatedNoise
     fixed : tuple of str
         Parameters of the joint that are known.
     """
 
     assembly: Assembly
     freq_hz: FloatArray
-    noise: ExpectedNoise
+    noise: StatedNoise
     fixed: tuple[str, ...]
 
     def information(self, channels: Channels, measured: Assembly | None = None) -> FrfInformation:
@@ -165,6 +171,37 @@ class PlannedTest:
             total = replace(total, of_frf=total.of_frf + one.of_frf, of_line=of_line, pull=pull)
         return total
 
+    @property
+    def has_errors(self) -> bool:
+        """Whether a fit allows for errors that no unknown describes: of models, or of a gain of all FRFs."""
+        return any(part.is_uncertain for part in self.assembly.parts.values())
+
+    def error_information(self, channels: Channels) -> ErrorInformation:
+        """Return the information of all FRFs between these channels on parameters and errors of models and gain."""
+        vector, shape = self.vector(channels), (len(channels.responses), len(channels.forces))
+        prediction = Prediction(self.assembly, self.freq_hz, channels.responses, channels.forces)
+        longer, groups = error_terms(prediction, vector, shape, GAIN if self.has_errors else 0.0)
+        weight = np.concatenate([np.zeros(0), *(one.weight for one in groups)])
+        y, slopes = prediction.linearised(longer, longer.values)
+        slopes *= np.concatenate([_scale(vector.fitted), weight])[:, None, None, None] * self._weight(self.freq_hz, y)
+        real = np.ascontiguousarray(slopes.transpose(2, 3, 0, 1)).view(np.float64)  # o, i, terms, re and im of lines
+        return ErrorInformation(real @ real.swapaxes(2, 3), self._prior(vector), groups)
+
+    def _weight(self, freq_hz: FloatArray, y: ComplexArray) -> FloatArray:
+        """Return one over the standard deviation of real and imaginary part of FRFs, 0 of those that are zero."""
+        deviation = np.sqrt(self.noise.variance(freq_hz, y) / 2)
+        shown = abs(y).max(axis=0) > _ROUNDING * abs(y).max()
+        found: FloatArray = 1 / np.where(shown & (deviation > 0), deviation, np.inf)
+        return found
+
+    @staticmethod
+    def _prior(vector: ParameterVector) -> FloatArray:
+        """Return the information of the priors on relative changes of the parameters."""
+        x, scale = vector.to_coordinates(vector.values), _scale(vector.fitted)
+        to_scale = scale / vector.slope(x)
+        found: FloatArray = vector.prior_information(x) * np.outer(to_scale, to_scale)
+        return found + np.eye(len(scale)) / _WIDEST**2
+
     def vector(self, channels: Channels) -> ParameterVector:
         """Return all parameters, with those of the channels."""
         prediction = Prediction(self.assembly, self.freq_hz[:1], channels.responses[:1], channels.forces[:1])
@@ -186,11 +223,8 @@ class PlannedTest:
     ) -> FrfInformation:
         prediction = Prediction(self.assembly, freq_hz, channels.responses, channels.forces)
         y, slopes = prediction.linearised(vector, vector.values)
-        deviation = np.sqrt(self.noise.variance(2 * np.pi * freq_hz, y) / 2)  # of real and imaginary part
-        shown = abs(y).max(axis=0) > _ROUNDING * abs(y).max()
-        weight = 1 / np.where(shown & (deviation > 0), deviation, np.inf)
-        scale = _scale(vector.fitted)
-        slopes *= scale[:, None, None, None] * weight
+        weight = self._weight(freq_hz, y)
+        slopes *= _scale(vector.fitted)[:, None, None, None] * weight
         real = np.moveaxis(slopes, 0, -1).copy().view(np.float64).reshape(*y.shape, -1, 2)  # lines, o, i, p, re and im
         of_frf = np.einsum("loipr,loiqr->oipq", real, real, optimize=True)
         of_line = np.einsum("loipr,loiqr->lpq", real, real, optimize=True)
@@ -199,7 +233,4 @@ class PlannedTest:
             change = (measured.receptance(freq_hz, channels.responses, channels.forces) - y) * weight
             parts = np.stack([change.real, change.imag], axis=-1)
             pull = np.einsum("loipr,loir->oip", real, parts, optimize=True)
-        x = vector.to_coordinates(vector.values)
-        to_scale = scale / vector.slope(x)
-        prior = vector.prior_information(x) * np.outer(to_scale, to_scale) + np.eye(len(scale)) / _WIDEST**2
-        return FrfInformation(vector.fitted, of_frf, of_line, prior, pull)
+        return FrfInformation(vector.fitted, of_frf, of_line, self._prior(vector), pull)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from jointfrf.dofs import Parameter, parameter_name
 from jointfrf.frf.bands import Band
+from jointfrf.frf.stated_noise import StatedNoise
 from jointfrf.identification.identify import identify
 from jointfrf.identification.information_bound import information_rows
 from jointfrf.identification.manifold.coordinates import DampingTerms
@@ -83,7 +84,7 @@ def plan_joint_frfs(
     gamma: ArrayLike,
     joint: Joint,
     *,
-    noise: float = 0.01,
+    noise: float | StatedNoise = 0.01,
     floor: float = 0.0,
     averages: float = 1.0,
     biased: ArrayLike | Mapping[str, ArrayLike] | None = None,
@@ -98,7 +99,9 @@ def plan_joint_frfs(
         FRFs of the assembly as they are expected, joint DOFs j, then k, m/N: from models of the parts, `couple`.
     joint : Joint
         As it is expected, without cross terms.
-    noise, floor, averages : float
+    noise : float or StatedNoise
+        As in `plan`.
+    floor, averages : float
         As in `plan`.
     biased : array_like, shape of gamma, or mapping of str to array_like, optional
         FRFs as the test will give them without noise: rotations by finite differences at a spacing, virtual points on
@@ -143,7 +146,7 @@ def plan_joint_frfs(
     matrices = {"k": joint.stiffness, "c": joint.damping, "h": joint.hysteretic_stiffness}
     if any((one - np.diag(np.diagonal(one))).any() for one in matrices.values()):
         raise ValueError("the joint has cross terms; give a joint without them")
-    variance = expected_noise(noise, floor, averages).variance(2 * np.pi * freq, lines)
+    variance = expected_noise(noise, floor, averages).variance(freq, lines)
     if not variance.all():
         raise ValueError("an FRF is zero on a line and has no noise there; give floor")
     kinds = ["k", *(kind for kind in "ch" if matrices[kind].any())]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, get_args
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.bands import Band
+from jointfrf.frf.stated_noise import StatedNoise
 from jointfrf.identification.model.assembly import AddedMass, Assembly
 from jointfrf.identification.model.prepare import Channels
 from jointfrf.identification.model.substructure import Unknown
@@ -25,7 +26,7 @@ from jointfrf.kernel.arguments import (
     one_line,
 )
 from jointfrf.messages.finding import Finding, WithFindings
-from jointfrf.planning.design import Criterion, Design, Designer, Prices, criterion_of
+from jointfrf.planning.design import Criterion, Design, Designer, Prices, criterion_of, loss_of
 from jointfrf.planning.information import FrfInformation, PlannedTest, expected_noise, narrowest_band
 from jointfrf.spelling import did_you_mean, some_of
 
@@ -176,7 +177,7 @@ def plan(
     responses: Sequence[str],
     forces: Sequence[str],
     *,
-    noise: float = 0.01,
+    noise: float | StatedNoise = 0.01,
     floor: float = 0.0,
     averages: float = 1.0,
     targets: Sequence[str] | None = None,
@@ -202,8 +203,8 @@ def plan(
         Lines that will be measured, above 0 Hz.
     responses, forces : sequence of str
         Candidates: DOFs ``"A/7:y"`` where there could be a sensor, and a hit or a shaker.
-    noise : float
-        Standard deviation of an average relative to the FRF.
+    noise : float or StatedNoise
+        Standard deviation of an average relative to the FRF; or relative part and floors.
     floor : float
         Standard deviation of an average of the accelerance that does not depend on the FRF, m/(s^2 N).
     averages : float
@@ -243,11 +244,13 @@ def plan(
     Notes
     -----
     Fisher information of relative changes of all parameters, priors included: its inverse is the least covariance of an
-    unbiased estimate, which `identify_model` reaches. Sensors and hits are added one at a time, the one first that
-    lowers the criterion most for its price; after each, sensors and hits are exchanged one by one as long as that
-    lowers it further (V. V. Fedorov, Theory of Optimal Experiments, 1972; D. C. Kammer, J. Guid. Control Dyn. 14 (1991)
-    251, for sensors of modes). Every sensor is read at every hit. The proposal is as good as the expected joint is:
-    plan with a soft and a stiff one where it is not known.
+    unbiased estimate, which `identify_model` reaches. Errors of models that are not exact are in the errors that are
+    stated, at the level that `identify_model` is expected to allow for; the choice is made without them. Sensors and
+    hits are added one at a time, the one first that lowers the criterion most for its price; after each, sensors and
+    hits are exchanged one by one as long as that lowers it further (V. V. Fedorov, Theory of Optimal Experiments, 1972;
+    D. C. Kammer, J. Guid. Control Dyn. 14 (1991) 251, for sensors of modes). Designs whose errors differ by less than
+    5e-6 are taken in the order of the candidates. Every sensor is read at every hit. The
+    proposal is as good as the expected joint is: plan with a soft and a stiff one if it is not known.
 
     Examples
     --------
@@ -294,8 +297,8 @@ def plan(
         np.inf,
     )  # fmt: skip
     designer = Designer(information.of_frf, information.prior, criterion_of(wanted, criterion), prices, kept)
-    planner = _Planner(test, channels, information, wanted, designer)
-    return planner.planned(list(goal.steps(designer)), as_not_negative("sensor_mass", sensor_mass, "kg"))
+    planner = _Planner(test, channels, information, wanted, criterion, designer)
+    return planner.planned(goal, as_not_negative("sensor_mass", sensor_mass, "kg"))
 
 
 def _targets(vector: ParameterVector, names: tuple[str, ...] | None) -> NDArray[np.intp]:
@@ -324,18 +327,18 @@ class _Goal(NamedTuple):
     within: float
     by_worth: bool
 
-    def steps(self, designer: Designer) -> Iterator[Design]:
+    def steps(self, designs: Iterable[PlanStep]) -> Iterator[PlanStep]:
         """Yield designs up to the goal."""
-        before: Design | None = None
-        for design in designer.designs():
-            if before is not None and designer.cost(design) > self.budget:
+        before: PlanStep | None = None
+        for one in designs:
+            if before is not None and one.cost > self.budget:
                 return
-            if before is not None and self.by_worth and np.exp((design.loss - before.loss) / 2) > 1 - _WORTH:
+            if before is not None and self.by_worth and one.error > (1 - _WORTH) * before.error:
                 return
-            yield design
-            if np.exp(design.loss / 2) <= self.within:
+            yield one
+            if one.error <= self.within:
                 return
-            before = design
+            before = one
 
 
 class _Planner(NamedTuple):
@@ -345,23 +348,26 @@ class _Planner(NamedTuple):
     channels: Channels
     information: FrfInformation
     targets: NDArray[np.intp]
+    criterion: Criterion
     designer: Designer
 
-    def planned(self, designs: list[Design], sensor_mass: float) -> MeasurementPlan:
-        """Return the plan that ends with the last of these designs."""
-        best, every = designs[-1], self.information
+    def planned(self, goal: _Goal, sensor_mass: float) -> MeasurementPlan:
+        """Return the plan that ends at a goal."""
+        designs = list[Design]()
+
+        def every_step() -> Iterator[PlanStep]:
+            for design in self.designer.designs():
+                designs.append(design)
+                yield self._step(design)
+
+        steps, every = tuple(goal.steps(every_step())), self.information
+        best = designs[len(steps) - 1]
         chosen = self._chosen(best, sensor_mass)
         line_share = chosen.shares(chosen.of_line)[:, self.targets].T
         parameters = every.parameters
         names = tuple(parameters[i].name for i in self.targets)
-        steps = tuple(self._step(design) for design in designs)
         n_o, n_i = every.of_frf.shape[:2]
-        all_of_it = Design(tuple(range(n_o)), tuple(range(n_i)), np.inf)
-        additions = sorted(
-            (self._addition(best, more) for more in self.designer.additions(best)),
-            key=lambda one: np.log(one.error / steps[-1].error) / one.cost,
-        )
-        everything = self._step(all_of_it)
+        everything = self._step(Design(tuple(range(n_o)), tuple(range(n_i)), np.inf))
         frf_share = np.moveaxis(every.shares(every.of_frf)[:, :, self.targets], -1, 0)
         found = MeasurementPlan(
             self.test.freq_hz,
@@ -370,7 +376,7 @@ class _Planner(NamedTuple):
             names,
             steps,
             everything,
-            tuple(additions),
+            tuple(self._additions(best, steps[-1])),
             line_share,
             frf_share,
             self.channels.responses,
@@ -382,35 +388,76 @@ class _Planner(NamedTuple):
         return replace(found, findings=tuple(_findings(found)))
 
     def _step(self, design: Design) -> PlanStep:
-        information = self.designer.information(design)
-        errors = np.sqrt(np.diagonal(np.linalg.inv(information))) * self.information.scale
+        """Return a design with the errors that a fit will state, those of the models with them."""
+        covariance = np.array(np.linalg.inv(self.designer.information(design)), np.float64)
+        own = self._own_channels(design)
+        if self.test.has_errors:
+            at, known = self._places(own), self.test.error_information(own)
+            covariance[np.ix_(at, at)] = known.covariance(range(len(design.sensors)), range(len(design.hits)))
+        errors = np.sqrt(np.diagonal(covariance)) * self.information.scale
         return PlanStep(
-            tuple(self.channels.responses[o] for o in design.sensors),
-            tuple(self.channels.forces[i] for i in design.hits),
+            own.responses,
+            own.forces,
             self.designer.cost(design),
-            float(np.exp(self.designer.loss(information) / 2)),
+            self._size(covariance),
             {one.name: float(error) for one, error in zip(self.information.parameters, errors, strict=True)},
         )
 
-    def _addition(self, design: Design, more: Design) -> Addition:
-        is_sensor = len(more.sensors) > len(design.sensors)
-        dof = self.channels.responses[more.sensors[-1]] if is_sensor else self.channels.forces[more.hits[-1]]
-        cost = self.designer.prices.sensor if is_sensor else self.designer.prices.hit
-        return Addition("sensor" if is_sensor else "hit", dof, cost, float(np.exp(more.loss / 2)))
+    def _size(self, covariance: FloatArray) -> float:
+        """Return the size of the errors of the targets."""
+        return float(np.exp(loss_of(covariance[np.ix_(self.targets, self.targets)], self.criterion) / 2))
 
-    def _chosen(self, design: Design, sensor_mass: float) -> FrfInformation:
-        """Return the information of a design by line, and what the masses of its sensors move."""
+    def _places(self, channels: Channels) -> list[int]:
+        """Return the numbers of the parameters of some channels among all."""
+        names = [one.name for one in self.information.parameters]
+        return [names.index(one.name) for one in self.test.vector(channels).fitted]
+
+    def _additions(self, best: Design, step: PlanStep) -> Iterator[Addition]:
+        """Yield what would come next, the most useful for its price first."""
+        grown = list(self.designer.additions(best))
+        if self.test.has_errors:
+            grown = [replace(more, loss=2 * np.log(size)) for more, size in self._sizes_with_errors(best, grown)]
+        prices = self.designer.prices
+        for more in self.designer.ranked(replace(best, loss=2 * np.log(step.error)), grown):
+            is_sensor = len(more.sensors) > len(best.sensors)
+            dof = self.channels.responses[more.sensors[-1]] if is_sensor else self.channels.forces[more.hits[-1]]
+            kind, cost = ("sensor", prices.sensor) if is_sensor else ("hit", prices.hit)
+            yield Addition(kind, dof, cost, float(np.exp(more.loss / 2)))
+
+    def _sizes_with_errors(self, best: Design, grown: Sequence[Design]) -> Iterator[tuple[Design, float]]:
+        """Yield larger designs with the size of their errors, those of the models with them."""
+        n_o, n_i = self.information.of_frf.shape[:2]
+        sensors = [*best.sensors, *(o for o in range(n_o) if o not in best.sensors)]
+        hits = [*best.hits, *(i for i in range(n_i) if i not in best.hits)]
+        for rows, columns in ((sensors, best.hits), (best.sensors, hits)):
+            own = [one for one in grown if (len(one.sensors) > len(best.sensors)) == (rows is sensors)]
+            if not own:
+                continue
+            channels = self._own_channels(Design(tuple(rows), tuple(columns), np.inf))
+            known, at = self.test.error_information(channels), self._places(channels)
+            covariance: FloatArray = np.diag(np.full(len(self.information.parameters), np.inf))
+            for one in own:
+                covariance[np.ix_(at, at)] = known.covariance(
+                    [rows.index(o) for o in one.sensors], [columns.index(i) for i in one.hits]
+                )
+                yield one, self._size(covariance)
+
+    def _own_channels(self, design: Design) -> Channels:
+        """Return the channels of a design."""
         own = self.channels
         responses = tuple(own.responses[o] for o in design.sensors)
         forces = tuple(own.forces[i] for i in design.hits)
-        chosen = Channels(
+        return Channels(
             responses, forces,
             {name: gain for name, gain in own.response_gains.items() if name in responses},
             {name: gain for name, gain in own.force_gains.items() if name in forces},
         )  # fmt: skip
-        measured = None
+
+    def _chosen(self, design: Design, sensor_mass: float) -> FrfInformation:
+        """Return the information of a design by line, and what the masses of its sensors move."""
+        chosen, measured = self._own_channels(design), None
         if sensor_mass:
-            masses = tuple(AddedMass(dofs, sensor_mass) for dofs in self._nodes(responses))
+            masses = tuple(AddedMass(dofs, sensor_mass) for dofs in self._nodes(chosen.responses))
             measured = self.test.assembly.with_attachments(*masses)
         return self.test.information(chosen, measured)
 

@@ -25,6 +25,8 @@ _HALF = float(norm.ppf(0.975))
 _LEAST_TO_JUDGE = 4
 #: Chance with which any fit of a set without outliers is named, and with which a factor is said to matter.
 _SIGNIFICANT = 0.05
+#: Chance of fits that agree so well, below which a part of their errors is taken as common to all.
+_AGREE = 0.01
 #: A spread below this share of what its interval reaches is zero: what a minimiser leaves of it.
 _NOTHING = 1e-3
 #: The factor whose groups are assemblies, and what its repeats differ by.
@@ -102,11 +104,14 @@ class PooledParameter:
         Of each factor; what no factor explains comes last.
     trends : tuple of FactorTrend
     labels : tuple of str
-        Of the fits that have this parameter.
+        Labels of the fits that have this parameter.
     estimates : tuple of Estimate
         Theirs.
     outlying : tuple of str
         Labels of those that do not belong to the others.
+    at : dict of str to float
+        Number of each trend at which `mean` and `next_one` are stated: the mean of the fits, on "log" the geometric
+        mean.
     """
 
     name: str
@@ -119,6 +124,7 @@ class PooledParameter:
     labels: tuple[str, ...]
     estimates: tuple[Estimate, ...]
     outlying: tuple[str, ...]
+    at: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -169,11 +175,16 @@ def pooled_parameter(
     if not is_log:
         findings.append(Finding("pooled-linearly", about=(name,)))
     names, effects = _random_effects(used, at, is_log, plan)
+    chance, share = effects.excess_of_errors
+    if chance < _AGREE:
+        findings.append(Finding("errors-shared", {"chance": chance, "share": share}, (name,)))
+        effects = effects.with_shared_errors(share)
     outlying = _outlying(effects, names, tuple(plan.labels[i] for i in at))
     mean, ahead = _mean_and_next(effects, names, is_log, plan.probability)
     pooled = PooledParameter(
         name, unit, "log" if is_log else "linear", mean, ahead, _spreads(effects, names, plan.probability),
         _trends(effects, tuple(plan.trends), plan.probability), tuple(plan.labels[i] for i in at), used, outlying,
+        {own: _centre(numbers[at], is_log) for own, numbers in plan.trends.items()},
     )  # fmt: skip
     return pooled, findings + list(_findings(pooled))
 
@@ -201,8 +212,8 @@ def _random_effects(
     for name, numbers in plan.trends.items():
         if is_log and (numbers[at] <= 0).any():
             raise ValueError(f"the trend over {one_line(name)} is a power law; give numbers above zero")
-        shown = np.log(numbers[at]) if is_log else numbers[at]
-        columns.append(shown - shown.mean())
+        centre = _centre(numbers[at], is_log)
+        columns.append(np.log(numbers[at] / centre) if is_log else numbers[at] - centre)
     design = np.column_stack(columns)
     if np.linalg.matrix_rank(design) < len(columns) or len(columns) >= at.size:
         raise ValueError(
@@ -216,6 +227,11 @@ def _random_effects(
             names.append(name)
             factors.append(group)
     return names, RandomEffects(values, covariance, design, factors)
+
+
+def _centre(numbers: FloatArray, is_log: bool) -> float:
+    """Return the mean of the numbers of a trend, on a logarithmic scale the geometric one."""
+    return float(np.exp(np.log(numbers).mean()) if is_log else numbers.mean())
 
 
 def _mean_and_next(
@@ -232,12 +248,12 @@ def _mean_and_next(
 
 
 def _spreads(effects: RandomEffects, names: Sequence[str], probability: float) -> tuple[FactorSpread, ...]:
-    tails = ((1 - probability) / 2, (1 + probability) / 2)
+    tails = (1 - probability) / 2
     found = []
     for component, name in enumerate((_REPEAT if ASSEMBLY in names else ASSEMBLY, *names)):
         levels = int(effects.factors[component - 1].max()) + 1 if component else effects.values.size
-        low, high = np.sqrt(np.quantile(effects.variances[:, component], tails)).tolist()
-        value = math.sqrt(effects.reml[component])
+        low = math.sqrt(np.quantile(effects.variances[:, component], tails))
+        value, high = math.sqrt(effects.reml[component]), math.sqrt(effects.upper_limit(component, tails))
         value = value if value > _NOTHING * high else 0.0
         chance = effects.chance_of_no_spread(component)
         found.append(FactorSpread(name, levels, value, low, high, chance))

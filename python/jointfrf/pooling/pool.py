@@ -60,9 +60,26 @@ class PooledFits(WithFindings):
             for slope in one.trends:
                 limits = f"{slope.low:.3g} .. {slope.high:.3g}"
                 trends.append((one.name, slope.factor, f"{slope.value:.3g}", limits, shown_chance(slope.p_value), by))
-        tables = [columns_of(table) for table in (means, spreads, trends) if table[1:]]
+        first, *others = [columns_of(table) for table in (means, spreads, trends) if table[1:]] or [[]]
+        places = [f"{', '.join(names)}: mean and next assembly at {where}" for where, names in self.places.items()]
         said = [str(one) for one in self.findings]
-        return "\n\n".join("\n".join(lines) for lines in ([f"{len(self.labels)} fits"], *tables, said) if lines)
+        parts = ([f"{len(self.labels)} fits"], first, places, *others, said)
+        return "\n\n".join("\n".join(lines) for lines in parts if lines)
+
+    @property
+    def places(self) -> dict[str, list[str]]:
+        """Names of parameters by the numbers of the trends at which their means and next assemblies are stated."""
+        found = dict[str, list[str]]()
+        for one in self.parameters.values():
+            if one.at:
+                found.setdefault(place_of(one), []).append(one.name)
+        return found
+
+
+def place_of(one: PooledParameter) -> str:
+    """Return the numbers of the trends at which mean and next assembly of a parameter are stated."""
+    kind = " (geometric mean)" if one.scale == "log" else " (mean)"
+    return ", ".join(f"{name} {number:.4g}{kind}" for name, number in one.at.items())
 
 
 def _limits(one: Estimate) -> str:

@@ -7,13 +7,14 @@ in the metric of the covariance drops by a chi-squared number when the groups of
 for s_f^2, one factor after the other, finest first, quantiles of chi-squared become a confidence distribution of the
 variances; given them, means are normal. For equal errors that is the t distribution, for errors of their own that of
 Cochran's Q. Source: H. Iyer, C. Wang, T. Mathew, Models and confidence intervals for true values in interlaboratory
-trials, JASA 99 (2004) 1060; for the variance alone W. Viechtbauer, Statistics in Medicine 26 (2007) 37.
+trials, JASA 99 (2004) 1060; for the variance alone W. Viechtbauer, Statistics in Medicine 26 (2007) 37; for its upper
+limit A. L. Read, Presentation of search results: the CLs technique, J. Phys. G 28 (2002) 2693.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -32,6 +33,11 @@ _POINTS, _FEW_POINTS = 512, 128
 _HALVINGS = 48
 #: Eigenvalues below this share of the largest are zero: rounding of n = 100 values.
 _RANK = 1e-9
+#: Restricted likelihoods whose -2 ln differ by less than this are equally high: far above rounding, far below what
+#: data decide.
+_EQUAL = 1e-6
+#: Share of the variance of errors that stays their own, so that equal values leave a covariance that has an inverse.
+_LEAST_OWN = 1e-6
 #: Standard deviations within which quantiles of a mixture are sought: beyond the smallest probability asked, 1e-9.
 _REACH = 8.0
 
@@ -150,21 +156,78 @@ class RandomEffects:
         beta = (normal @ (inverse @ self.values @ self.design)[..., None])[..., 0]
         return Mixture(beta @ weights, weights @ normal @ weights + more)
 
+    def upper_limit(self, component: int, chance: float) -> float:
+        """Return the value that the variance of a component exceeds with a chance, given that it is not negative.
+
+        Values that agree by chance better than their errors would otherwise bound the variance by zero. With Q(t) the
+        pivot at the variance t, the limit solves P(chi^2 <= Q(t)) = chance P(chi^2 <= Q(0)). The limit is never below
+        the quantile of `variances`.
+        """
+        known = self.covariance[None]
+        for one in range(component):
+            z = self._effects[one]
+            known = known + self.variances[:, one, None, None] * (z @ z.T)
+        size, square = self._spectrum(component, known, self._coarser(component))
+        share = np.divide(square, size, out=np.zeros_like(square), where=size > 0)
+        degrees = self.degrees_of_freedom[component]
+
+        def below(variance: float) -> float:
+            return float(chi2.cdf((share / (1 + variance * size)).sum(axis=1), degrees).mean())
+
+        aim = chance * below(0.0)
+        high = 1 / float(size.max())
+        while below(high) > aim:
+            high *= 2
+        return float(brentq(lambda variance: below(variance) - aim, 0.0, high, rtol=1e-10)) if aim > 0 else 0.0
+
     @cached_property
     def reml(self) -> FloatArray:
-        """Variances by restricted maximum likelihood, shape (1 + factors,)."""
-        start = np.sqrt(np.median(self.variances, axis=0))
-        scale = max(float(start.max()), float(np.sqrt(np.diagonal(self.covariance).mean())))
+        """Variances by restricted maximum likelihood, shape (1 + factors,).
 
-        def minus_twice_log(spread: FloatArray) -> float:
-            total = self._total_of((scale * spread[None]) ** 2)
-            weight = np.linalg.inv(total)[0]
-            p = _residual_weights(total, self.design)[0]
-            logs = np.linalg.slogdet(total[0])[1] + np.linalg.slogdet(self.design.T @ weight @ self.design)[1]
-            return float(logs + self.values @ p @ self.values)
+        The restricted likelihood can have several maxima: the search starts from the median of `variances`, from zero,
+        and from each component alone. Among maxima within `_EQUAL` of the highest, the estimate is the one of the least
+        total variance.
+        """
+        median = np.median(self.variances, axis=0)
+        projected = _residual_weights(np.eye(self.values.size)[None], self.design)[0]
+        free = self.values.size - self.design.shape[1]
+        scale = max(float(median.max()), float(self.values @ projected @ self.values) / free)
+        if not scale > 0:
+            return np.zeros(median.size)
+        starts = [median / scale, np.zeros(median.size), *np.eye(median.size)]
+        found = [
+            minimize(self._restricted, start, (scale,), "L-BFGS-B", jac=True, bounds=[(0, None)] * start.size,
+                     options={"ftol": 0.0, "gtol": 1e-9}) for start in starts
+        ]  # fmt: skip
+        lowest = min(one.fun for one in found)
+        best = min((one.x for one in found if one.fun < lowest + _EQUAL), key=lambda x: float(x.sum()))
+        return np.asarray(scale * best)
 
-        found = minimize(minus_twice_log, start / scale + 1e-3, method="L-BFGS-B", bounds=[(0, None)] * start.size)
-        return np.asarray((scale * found.x) ** 2)
+    def _restricted(self, relative: FloatArray, scale: float) -> tuple[float, FloatArray]:
+        """Return -2 ln of the restricted likelihood, and its derivatives by the variances in units of `scale`."""
+        total = self._total_of(scale * relative[None])
+        weight = np.linalg.inv(total)[0]
+        p = _residual_weights(total, self.design)[0]
+        logs = np.linalg.slogdet(total[0])[1] + np.linalg.slogdet(self.design.T @ weight @ self.design)[1]
+        residual = p @ self.values
+        slopes = [np.sum(z * (p @ z)) - np.sum((z.T @ residual) ** 2) for z in self._effects]
+        return float(logs + self.values @ residual), scale * np.array(slopes)
+
+    @cached_property
+    def excess_of_errors(self) -> tuple[float, float]:
+        """Probability of values that agree so well for their errors, and the share of V that exceeds their scatter.
+
+        The share is 1 - Q/d, where Cochran's Q has d degrees of freedom and all factors are eliminated.
+        """
+        size, square = self._spectrum(0, self.covariance[None], self._around(0)[1])
+        seen = size > 0
+        q, degrees = float((square[seen] / size[seen]).sum()), int(seen.sum())
+        return float(chi2.cdf(q, degrees)), min(1 - q / degrees, 1 - _LEAST_OWN)
+
+    def with_shared_errors(self, share: float) -> RandomEffects:
+        """Return the model in which a share of the variance of the errors is one error that all values have."""
+        common = share * float(np.diagonal(self.covariance).mean())
+        return replace(self, covariance=(1 - share) * self.covariance + common)
 
     def chance_of_no_spread(self, component: int) -> float:
         """Return the probability of groups that differ at least so much where the variance of a component is zero.

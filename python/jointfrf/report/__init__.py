@@ -4,10 +4,10 @@ table        a table as data; as aligned text, as CSV, and its cells as a reader
 figure       a figure as data: curves, areas, levels, intervals, shaded surfaces on panels; as CSV
 axes         what several figures share: labels with units, limits of axes and numbers along them, percentiles
 receptance   receptances: modulus and phase below each other; the noise found in them
+decay_figure  frequency and damping over the amplitude of a mode
 draw         a figure drawn by matplotlib to a PNG and an SVG file
 chart        a figure as part of a page, which a script zooms
 sketch       the channels around a joint; the parts of an assembly with sensors and hits
-space        the channels in space, which a script turns and moves, with their deformation
 document     one self-contained HTML page from sentences, tables, figures and texts
 fit          figures of an identification and of where its information lies; its files
 fit_frfs     measured FRFs against those regenerated with the joint

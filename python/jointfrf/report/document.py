@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from importlib.metadata import version
@@ -15,7 +15,7 @@ from urllib.parse import quote
 import numpy as np
 
 from jointfrf.dofs import Parameter
-from jointfrf.extras import check_extras, import_extra
+from jointfrf.extras import check_extras
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.messages.finding import Finding, worst_first
 from jointfrf.report.chart import Chart, chart_view, style_rules
@@ -33,7 +33,6 @@ __all__ = [
     "Picture",
     "Section",
     "Sketch",
-    "Space",
     "Words",
     "make_document",
     "section_of_command",
@@ -79,16 +78,6 @@ class Sketch:
 
 
 @dataclass(frozen=True)
-class Space:
-    """A view in space: what its script draws, by plotly, its caption, and the same in words."""
-
-    key: str
-    caption: str
-    alt: str
-    content: Mapping[str, Any]
-
-
-@dataclass(frozen=True)
 class HeatMap:
     """Numbers by row and column, shaded from `light` (no shade) to `dark`; NaN is left empty.
 
@@ -123,7 +112,7 @@ class Listing:
     printed: bool = False
 
 
-Part = Table | Words | Picture | Chart | Sketch | Space | HeatMap | Listing
+Part = Table | Words | Picture | Chart | Sketch | HeatMap | Listing
 
 
 @dataclass(frozen=True)
@@ -230,9 +219,6 @@ def make_document(document: Document) -> str:
         keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True, finalize=_seen,
     )  # fmt: skip
     script = (_FOLDER / "chart.js").read_text(encoding="utf-8") if charts else ""
-    if any(isinstance(part, Space) for part in parts):
-        script += import_extra("plotly.offline").get_plotlyjs() + ";\n"
-        script += (_FOLDER / "space.js").read_text(encoding="utf-8")
     script = script.replace("\r\n", "\n").replace("\r", "\n")  # as a browser reads it, whose checksum must be the same
     return environment.get_template("page.html.jinja").render(
         document=document,
@@ -271,7 +257,7 @@ def _seen(value: Any) -> Any:
 
 def _style(parts: Sequence[Part], charts: Sequence[Chart]) -> str:
     """Return the rules of style of a page: those of all pages, and those of the parts it has."""
-    kinds = {"chart": Chart, "map": HeatMap, "sketch": Sketch, "space": Space}
+    kinds = {"chart": Chart, "map": HeatMap, "sketch": Sketch}
     names = ["page", *(name for name, kind in kinds.items() if any(isinstance(part, kind) for part in parts))]
     rules = [(_FOLDER / f"{name}.css").read_text(encoding="utf-8") for name in names]
     return "".join(rules) + (style_rules(charts) if charts else "")
@@ -287,8 +273,6 @@ def _view(part: Part) -> dict[str, Any]:
         return {"kind": "chart", **chart_view(part)}
     if isinstance(part, HeatMap):
         return {"kind": "map", **_map_view(part)}
-    if isinstance(part, Space):
-        return {"kind": "space", "space": part}
     if isinstance(part, Sketch):
         from markupsafe import Markup
 

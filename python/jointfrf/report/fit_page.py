@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,13 +13,12 @@ from typing import get_args
 import numpy as np
 
 from jointfrf.dofs import ParameterKind, is_rotation, parameter_name, point_and_direction
-from jointfrf.extras import check_extras
 from jointfrf.files import write_file
 from jointfrf.frf.calibration import shows_calibration
 from jointfrf.identification.fit_cards import cards
 from jointfrf.identification.fit_data import FitData, ModelData
 from jointfrf.identification.result import UNDETERMINED, Fit, FittedParameter, is_undetermined
-from jointfrf.io.cards import CardFormat
+from jointfrf.io.card_link import CardFormat
 from jointfrf.kernel.arguments import FloatArray, check_type
 from jointfrf.kernel.call import get_engine
 from jointfrf.report.axes import bands_in_words, prefixed_unit
@@ -38,7 +37,6 @@ from jointfrf.report.fit_frfs import (
 from jointfrf.report.fit_model import assurance_map, band_map, next_parts, unknowns_table
 from jointfrf.report.receptance import noise_figure
 from jointfrf.report.sketch import SketchedPart, assembly_sketch, interface_points, interface_sketch, point_table
-from jointfrf.report.space import space_of_fit
 from jointfrf.report.table import Cell, Table
 
 __all__ = [
@@ -60,27 +58,29 @@ _AT_ONCE = 6
 _FIRST_FOUND = 3
 #: Lines of cards that are printed at most.
 _PRINTED = 40
+#: Relative changes of parameters that are shown at least.
+_SHOWN_CHANGE = 1e-4
 #: What is said above the charts of a fit with models.
 _HOW_MODEL = (
     "The joint found, from all frequency lines together; the shaded band is the 95 % interval of the real part. Drag "
     "across a chart to zoom in, double-click for the whole band."
 )
 #: Programs of cards as they call themselves.
-_PROGRAMS = {"abaqus": "Abaqus", "calculix": "CalculiX", "nastran": "Nastran", "ansys": "Ansys"}
+_PROGRAMS = {"abaqus": "Abaqus", "calculix": "CalculiX", "nastran": "Nastran", "ansys": "Ansys",
+             "code_aster": "Code_Aster", "lsdyna": "LS-DYNA", "subdyn": "SubDyn"}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class ReportOptions:
     """What a report says beside the fit.
 
-    The file measured, the command typed, nodes j and k of cards, parts drawn, and whether there is a view in space.
+    The file measured, the command typed, nodes j and k of cards, and parts drawn.
     """
 
     source: str = ""
     command: str = ""
     nodes: Sequence[int] = (1, 2)
     parts: Sequence[SketchedPart] = ()
-    space: bool = False
 
 
 def write_report(
@@ -91,7 +91,6 @@ def write_report(
     command: str = "",
     nodes: Sequence[int] = (1, 2),
     parts: Sequence[SketchedPart] = (),
-    space: bool = False,
 ) -> Path:
     """Write a page on a fit: one HTML file with all that is needed to judge and to quote the joint, no link to another.
 
@@ -109,9 +108,6 @@ def write_report(
     parts : sequence of SketchedPart
         All parts of an assembly with the places of their nodes, as `MeasuredAssembly.sketched`: they are drawn with
         channels and joints.
-    space : bool
-        Whether the page has a view in space of channels, forces and joint, with the deformation measured and fitted at
-        each frequency, moving. It needs plotly, whose script makes the page 5 MB larger, and WebGL where it is read.
 
     Returns
     -------
@@ -123,18 +119,15 @@ def write_report(
     ValueError
         The fit does not hold the measured FRFs: it was loaded, or is a mean over bands.
     MissingPackageError
-        jinja2 is missing, or with `space` plotly.
+        jinja2 is missing.
     OSError
         The file cannot be written.
     """
     check_type("fit", fit, Fit)
-    check_type("space", space, bool)
-    if space:
-        check_extras("plotly")
     check_type("parts", parts, Sequence)
     for part in parts:
         check_type("parts", part, SketchedPart)
-    write_file(Path(path), make_document(fit_document(fit, ReportOptions(source, command, nodes, parts, space))))
+    write_file(Path(path), make_document(fit_document(fit, ReportOptions(source, command, nodes, parts))))
     return Path(path)
 
 
@@ -199,13 +192,7 @@ def _model_sections(fit: Fit, options: ReportOptions) -> list[Section]:
 
 def _drawn(fit: Fit, options: ReportOptions) -> list[Part]:
     sketch = assembly_sketch(options.parts, fit.responses, fit.forces) if options.parts else None
-    return [*([] if sketch is None else [sketch]), *_in_space(fit, options)]
-
-
-def _in_space(fit: Fit, options: ReportOptions) -> list[Part]:
-    if not options.space:
-        return []
-    return [space_of_fit(fit, options.parts) or Words(["The places of points are not known: no view in space."])]
+    return [] if sketch is None else [sketch]
 
 
 def _channels(fit: Fit) -> Table:
@@ -312,8 +299,10 @@ def _geometry(fit: Fit, data: FitData, options: ReportOptions) -> list[Part]:
         )
         return [Words([f"The positions of the channels are not known, so there is no sketch. {known}."])]
     points = interface_points(data.interface)
+    if not data.interface.placed:
+        return [Words(["The file has no positions of these points, so there is no sketch."]), point_table(points)]
     sketch: Sketch = interface_sketch(data.interface, points, fit.dofs)
-    return [sketch, *_in_space(fit, options), point_table(points)]
+    return [sketch, point_table(points)]
 
 
 def _how_joint(fit: Fit) -> str:
@@ -401,6 +390,24 @@ def _noise_parts(fit: Fit, figure: Figure | None, most: int) -> list[Part]:
     return list(_charts([figure], most, fit, "measured and smooth FRFs and the noise found in them"))
 
 
+def _hidden_changes(fit: Fit) -> Callable[[str, str], str]:
+    """Return a function from the name and the size of an error to a sentence on its effect; empty if it is unknown."""
+    known = fit.data.hidden_errors() if isinstance(fit.data, FitData) else {}
+
+    def sentence(name: str, size: str) -> str:
+        if name not in known:
+            return ""
+        shares = [
+            (own, 100 * change / fit.value[own])
+            for own, change in known[name].items()
+            if own in fit.value and abs(change) >= _SHOWN_CHANGE * abs(fit.value[own]) > 0
+        ]
+        changes = ", ".join(f"{own} by {share:+.2g} %" for own, share in shares)
+        return f" In this test {size} changes {changes}." if changes else f" In this test {size} changes little."
+
+    return sentence
+
+
 def _blind_spots(fit: Fit, *, is_square: bool) -> Section:
     """Say which errors of a test no FRF shows: no interval holds them."""
     assert fit.data is not None
@@ -419,13 +426,19 @@ def _blind_spots(fit: Fit, *, is_square: bool) -> Section:
             "No h_pq and h_qp were both measured on lines enough: nothing shows whether sensors and hammers are "
             "calibrated, and no interval allows for it."
         )
+    changes = _hidden_changes(fit)
     others = [
-        "A gain that all FRFs share, and a delay of all hits: stiffness and damping carry them one to one; a delay "
-        "τ adds k τ to c.",
-        "Sensors that all resonate at one frequency f₀: FRFs at f are too large by (f/f₀)².",
-        "Noise of the measured force: H1 estimates are too small by its share; H2 estimates of noisy responses are "
-        "too large.",
-        "Exponential windows: with exp(-σt) a stiffness grows by c σ, unless σ was given (window_decay).",
+        "A gain that all FRFs share: it changes stiffness and damping by the same factor.",
+        f"A delay of all impacts relative to the responses.{changes('delay', '1 µs')}",
+        "Sensors that all resonate at one frequency f₀: FRFs at f are too large by (f/f₀)²."
+        f"{changes('resonance', 'f₀ at ten times the highest line')}",
+        "Noise of the measured force: H1 estimates are too small by its share in the power of the force; H2 estimates "
+        f"of noisy responses are too large.{changes('force-noise', '1 % of the power')}",
+        "Exponential windows: with exp(-σt) a stiffness grows by c σ, unless σ was given (window_decay). A Hann window "
+        "on the decaying response of an impact adds damping.",
+        "Sensors and impacts that are not at their stated places, unless you stated the error of the positions "
+        "(position_error): an error of 1 mm between two points changes the rotation between them by 1 mm over their "
+        f"distance.{changes('position', '1 mm at each point')}",
     ]
     return Section("blind", "What this test cannot know", [Words([seen, *others])])
 

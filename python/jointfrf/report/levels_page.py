@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from jointfrf.amplitude.decay import ModalDecay
 from jointfrf.amplitude.levels import JointLevel, JointLevels
 from jointfrf.dofs import is_rotation
 from jointfrf.files import write_file
 from jointfrf.kernel.arguments import check_type
+from jointfrf.report.decay_figure import modal_decay_figure
 from jointfrf.report.document import (
     Document,
     Picture,
@@ -41,6 +43,7 @@ def levels_figure(found: JointLevels, dof: str) -> Figure:
     at = np.array(sorted(fitted))
     axes = [(f"amplitude, {motion}", np.array([one.amplitude for one in own]), at)]
     of_law = at if law is None else at * law.stiffness * np.hypot(1.0, law.loss_factor)
+    name_of_law = "" if law is None else f"law: {law.law}" if law.widened == 1 else f"nearest law: {law.law}"
     axes.append((f"force, {load}", np.array([one.force for one in own]), of_law))
     panels = []
     for name, unit in (("stiffness", f"{load}/{motion}"), ("loss factor", "1")):
@@ -50,7 +53,7 @@ def levels_figure(found: JointLevels, dof: str) -> Figure:
         for label, x, x_law in axes:
             order = np.argsort(x)
             curves = [Curve("found", x[order], value[order], "ismm-points")]
-            curves += [] if law is None else [Curve(f"law: {law.law}", x_law, getattr(law, attribute), "actual")]
+            curves += [] if law is None else [Curve(name_of_law, x_law, getattr(law, attribute), "actual")]
             ribbon = Ribbon(f"{100 * found.probability:g} %", x[order], low[order], high[order], "ismm")
             below = label if attribute == "loss_factor" else ""
             panels.append(Panel("", below, f"{name}, {unit}", tuple(curves), (ribbon,), log_x=True))
@@ -58,7 +61,7 @@ def levels_figure(found: JointLevels, dof: str) -> Figure:
     return Figure(f"levels-{dof}", caption, tuple(panels), columns=2)
 
 
-def write_levels(found: JointLevels, path: Path | str, *, command: str = "") -> Path:
+def write_levels(found: JointLevels, path: Path | str, *, command: str = "", modes: Sequence[ModalDecay] = ()) -> Path:
     """Write a page on a joint at several levels: one HTML file, no link to another.
 
     Parameters
@@ -68,6 +71,8 @@ def write_levels(found: JointLevels, path: Path | str, *, command: str = "") -> 
         In a folder that exists.
     command : str
         How it was made, as typed.
+    modes : sequence of ModalDecay
+        Free decays that the levels come from; default none.
 
     Returns
     -------
@@ -82,9 +87,18 @@ def write_levels(found: JointLevels, path: Path | str, *, command: str = "") -> 
         The file cannot be written.
     """
     check_type("found", found, JointLevels)
-    figures = [levels_figure(found, dof) for dof in found.levels]
+    figures = [*map(modal_decay_figure, modes), *(levels_figure(found, dof) for dof in found.levels)]
+    left_out = [f"Left out: {test}. {why}" for test, why in found.left_out.items()]
     sections = [
-        Section("summary", "Summary", [Words(list(_sentences(found))), *words_of_findings(found.findings)]),
+        Section(
+            "summary",
+            "Summary",
+            [
+                *([Words(left_out, "warnings")] if left_out else []),
+                Words(list(_sentences(found))),
+                *words_of_findings(found.findings),
+            ],
+        ),
         Section("levels", "Over amplitude", [Picture(one, draw(one)) for one in figures]),
         Section("tables", "Tables", [table for dof in found.levels for table in _tables(found, dof)]),
         section_of_command(command),
@@ -111,8 +125,11 @@ def _sentences(found: JointLevels) -> Iterator[str]:
         if dof in found.laws:
             best, *others = found.laws[dof].fits
             apart = f", {others[0].aicc - best.aicc:.3g} below {others[0].law}" if others else ""
-            fit = f"chi^2 {best.chi_square:.3g} of {best.degrees}"
-            yield f"{dof}: the law with the lowest AICc is {best.law}{apart}; {fit}."
+            fit = f"chi^2 {best.chi_square:.3g} at {best.degrees} degrees of freedom"
+            if best.widened > 1:
+                yield f"{dof}: no law explains the levels within their errors (the nearest, {best.law}, has {fit})."
+            else:
+                yield f"{dof}: the law with the lowest AICc is {best.law}{apart}; {fit}."
 
 
 def _tables(found: JointLevels, dof: str) -> Iterator[Table]:
@@ -125,7 +142,8 @@ def _tables(found: JointLevels, dof: str) -> Iterator[Table]:
         rows = tuple((one.law, one.aicc, one.bic, one.chi_square, float(one.degrees)) for one in fits)
         yield Table(f"laws-{dof}", f"Laws of {dof}", ("law", "AICc", "BIC", "chi^2", "degrees of freedom"), rows)
         best = tuple((name, value, *fits[0].intervals[name]) for name, value in fits[0].values.items())
-        yield Table(f"law-{dof}", f"Parameters of {fits[0].law}", ("parameter", "value", "from", "to"), best)
+        title = f"Parameters of {fits[0].law}" + (", which does not fit the levels" if fits[0].widened > 1 else "")
+        yield Table(f"law-{dof}", title, ("parameter", "value", "from", "to"), best)
 
 
 def _row(one: JointLevel) -> tuple[str | float, ...]:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from jointfrf.files import write_file
 from jointfrf.kernel.arguments import check_type
-from jointfrf.pooling.parameter import Estimate, FactorSpread, FactorTrend, PooledParameter
-from jointfrf.pooling.pool import PooledFits
+from jointfrf.pooling.parameter import Estimate, FactorSpread, FactorTrend, PooledParameter, shown_chance
+from jointfrf.pooling.pool import PooledFits, place_of
 from jointfrf.report.axes import prefixed_unit
 from jointfrf.report.document import (
     Document,
@@ -23,7 +23,7 @@ from jointfrf.report.document import (
 )
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Figure, Interval, Level, Panel
-from jointfrf.report.table import Table, csv_cell
+from jointfrf.report.table import Table, csv_cell, without_repeats
 
 __all__ = ["forest_figure", "pool_csv", "write_pool"]
 
@@ -45,7 +45,8 @@ def forest_figure(one: PooledParameter, probability: float = 0.95) -> Figure:
         intervals=tuple(Interval(_row_name(label, one), own.low, own.value, own.high) for label, own in rows),
         levels=(Level("mean", one.mean.value, "actual"),), interval_names=("value", "95 %"),
     )  # fmt: skip
-    caption = f"{one.name} of each fit with its 95 % interval; the mean; where the next assembly lies"
+    place = f", both at {place_of(one)}" if one.at else ""
+    caption = f"{one.name} of each fit with its 95 % interval; the mean; where the next assembly lies{place}"
     return Figure(f"forest-{one.name.replace(',', '-')}", caption, (panel,))
 
 
@@ -103,9 +104,10 @@ def _sentences(pooled: PooledFits) -> Iterator[str]:
             f"{number / size:.4g}"
             for number in (one.mean.value, one.mean.low, one.mean.high, one.next_one.low, one.next_one.high)
         )
+        place = f" at {place_of(one)}" if one.at else ""
         yield (
-            f"{one.name} = {value} {unit} ({percent}: {low} to {high}); scatter {spread}; the next assembly lies "
-            f"between {least} and {most} {unit} with {percent} probability."
+            f"{one.name} = {value} {unit}{place} ({percent}: {low} to {high}); scatter {spread}; the next assembly"
+            f"{place and ' there'} lies between {least} and {most} {unit} with {percent} probability."
         )
 
 
@@ -116,16 +118,16 @@ def _spread(one: PooledParameter, value: float) -> str:
 def _mean_table(pooled: PooledFits) -> Table:
     rows = tuple(
         (one.name, one.unit, one.mean.value, one.mean.low, one.mean.high, one.next_one.low, one.next_one.high,
-         len(one.labels)) for one in pooled.parameters.values()
+         place_of(one), len(one.labels)) for one in pooled.parameters.values()
     )  # fmt: skip
-    columns = ("parameter", "unit", "mean", "mean from", "mean to", "next from", "next to", "fits")
-    return Table("means", "Means, and the next assembly", columns, rows)
+    columns = ("parameter", "unit", "mean", "mean from", "mean to", "next from", "next to", "at", "fits")
+    return without_repeats(Table("means", "Means, and the next assembly", columns, rows))
 
 
 def _spread_table(pooled: PooledFits) -> Table:
     rows = tuple(
         (one.name, own.factor, own.levels, _spread(one, own.value), _spread(one, own.low), _spread(one, own.high),
-         own.p_value) for one in pooled.parameters.values() for own in one.spreads
+         shown_chance(own.p_value)) for one in pooled.parameters.values() for own in one.spreads
     )  # fmt: skip
     columns = ("parameter", "factor", "levels", "spread", "from", "to", "p")
     return Table("spreads", "Spread beyond the errors of the fits (REML)", columns, rows)
@@ -134,7 +136,7 @@ def _spread_table(pooled: PooledFits) -> Table:
 def _trend_table(pooled: PooledFits) -> Table:
     rows = tuple(
         (one.name, own.factor, "exponent" if one.scale == "log" else f"{one.unit} by unit", own.value, own.low,
-         own.high, own.p_value) for one in pooled.parameters.values() for own in one.trends
+         own.high, shown_chance(own.p_value)) for one in pooled.parameters.values() for own in one.trends
     )  # fmt: skip
     return Table("trends", "Changes with a number", ("parameter", "factor", "as", "change", "from", "to", "p"), rows)
 
@@ -147,7 +149,7 @@ def pool_csv(pooled: PooledFits) -> str:
     for one in pooled.parameters.values():
         lines: list[tuple[str, str, Estimate | FactorSpread | FactorTrend, object]] = [
             *(("fit", label, own, "") for label, own in zip(one.labels, one.estimates, strict=True)),
-            ("mean", "", one.mean, ""), ("next assembly", "", one.next_one, ""),
+            ("mean", place_of(one), one.mean, ""), ("next assembly", place_of(one), one.next_one, ""),
             *(("spread", own.factor, own, own.p_value) for own in one.spreads),
             *(("trend", own.factor, own, own.p_value) for own in one.trends),
         ]  # fmt: skip

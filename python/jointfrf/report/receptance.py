@@ -185,7 +185,11 @@ def noise_panel(
     level = np.asarray(np.sqrt((noise.variance[at] / noise.line_factor)[up]), np.float64)
     parts: list[tuple[str, FloatArray, str]] = [
         ("relative part", noise.relative[entry] * smooth * usual, "low"),
-        ("constant part", noise.floor[entry] * usual, "damping"),
+        (
+            "part constant in acceleration" if noise.floor_of_acceleration else "constant part",
+            np.asarray(noise.floor[entry] * np.sqrt(noise.floor_shape(freq_hz)[up]) * usual),
+            "damping",
+        ),
     ]
     if noise.coherence_factor[entry] > 0:
         rest = level**2 - sum(part**2 for _, part, _ in parts)

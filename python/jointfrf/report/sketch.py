@@ -21,9 +21,7 @@ __all__ = [
     "assembly_sketch",
     "interface_points",
     "interface_sketch",
-    "moved_parts",
     "point_table",
-    "rows_of_points",
 ]
 
 #: Directions on the page, to the right and up, of x, y and z.
@@ -61,12 +59,16 @@ _Box = tuple[float, float, float, float]
 
 
 class InterfacePoint(NamedTuple):
-    """A measured point: name, side 0 (j) or 1 (k), place in m, directions of its channels, what is known of x, y, z."""
+    """A measured point: name, side 0 (j) or 1 (k), place in m, directions of its channels, what is known of x, y, z.
+
+    The direction of a channel that measures a rotation is zero; `axes` has its axis.
+    """
 
     name: str
     side: int
     place: FloatArray
     directions: tuple[FloatArray, ...]
+    axes: tuple[FloatArray, ...]
     known: tuple[bool, bool, bool] = (True, True, True)
 
 
@@ -80,30 +82,34 @@ def interface_points(interface: Interface) -> list[InterfacePoint]:
     numbers; three in a row that can be at one place, as those of a sensor of three axes, are one.
     """
     points = []
-    for name, own in rows_of_points(interface):
+    for name, own in _rows_of_points(interface):
         motion = interface.motion[own]
         side = int(motion[0, 6:].any())
         motion = motion[:, 6 * side : 6 * side + 6]
-        r, _ = _place(motion)
-        # Nothing says where along its only direction a point is.
-        ways = (
-            np.linalg.svd(motion[:, :3])[2][0] if np.linalg.matrix_rank(motion[:, :3], _PARALLEL) == 1 else np.zeros(3)
-        )
-        x, y, z = (bool(abs(part) <= _PARALLEL) for part in ways)
-        points.append(InterfacePoint(name, side, interface.references[side] + r, tuple(motion[:, :3]), (x, y, z)))
+        r, free, _ = _place(motion)
+        x, y, z = (interface.placed and bool((abs(free[:, i]) <= _PARALLEL).all()) for i in range(3))
+        ways, axes = tuple(motion[:, :3]), tuple(motion[:, 3:])
+        points.append(InterfacePoint(name, side, interface.references[side] + r, ways, axes, (x, y, z)))
     return points
 
 
-def _place(motion: FloatArray) -> tuple[FloatArray, float]:
-    """Return where channels are that move so with their reference point, and by how much that does not hold."""
+def _place(motion: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Return where channels are that move so with their reference point.
+
+    Then the directions along which nothing states where they are, shape (n, 3), and by how much the motion departs.
+    """
     # r x d is linear in r: the sum of r_a times e_a x d.
-    crosses = np.vstack([rigid_motion(d[None], np.zeros(3))[0][:, 3:] for d in motion[:, :3]])
-    turned = motion[:, 3:].ravel()
+    moves = motion[:, :3].any(axis=1)
+    if not moves.any():
+        return np.zeros(3), np.eye(3), 0.0
+    crosses = np.vstack([rigid_motion(d[None], np.zeros(3))[0][:, 3:] for d in motion[moves, :3]])
+    turned = motion[moves, 3:].ravel()
     r = np.linalg.lstsq(crosses, turned, rcond=None)[0]
-    return r, float(abs(crosses @ r - turned).max())
+    _, size, rows = np.linalg.svd(crosses)
+    return r, rows[size <= _PARALLEL * size[0]], float(abs(crosses @ r - turned).max())
 
 
-def rows_of_points(interface: Interface) -> list[tuple[str, list[int]]]:
+def _rows_of_points(interface: Interface) -> list[tuple[str, list[int]]]:
     """Return names of points, and the numbers of their channels."""
     if interface.channels:
         by_node: dict[int, list[int]] = {}
@@ -117,7 +123,7 @@ def rows_of_points(interface: Interface) -> list[tuple[str, list[int]]]:
         if first + 2 < count:
             motion = interface.motion[first : first + 3]
             for side in (motion[:, :6], motion[:, 6:]):
-                if abs(np.linalg.det(side[:, :3])) > _INDEPENDENT and _place(side)[1] <= _SAME * abs(side).max():
+                if abs(np.linalg.det(side[:, :3])) > _INDEPENDENT and _place(side)[2] <= _SAME * abs(side).max():
                     own = [first, first + 1, first + 2]
         found.append((f"{own[0]}-{own[-1]}" if len(own) > 1 else str(first), own))
         first = own[-1] + 1
@@ -131,22 +137,24 @@ def point_table(points: list[InterfacePoint]) -> Table:
             p.name,
             "jk"[p.side],
             *(float(1e3 * x) if known else None for x, known in zip(np.round(p.place, 9), p.known, strict=True)),
-            ", ".join(map(_axis, p.directions)),
+            ", ".join(map(_axis, p.directions, p.axes)),
         )
         for p in points
     )
     columns = ("point", "side", "x, mm", "y, mm", "z, mm", "directions")
-    note = "Empty or left out: a channel does not say where along its direction it is."
+    note = "Empty or left out: the file does not state this coordinate, nor do the directions of the channels."
     return Table(
         "points", "Points and directions", columns, rows, note="" if all(all(p.known) for p in points) else note
     )
 
 
-def _axis(direction: FloatArray) -> str:
+def _axis(direction: FloatArray, axis: FloatArray) -> str:
+    """Return the direction of a channel, or the axis of the rotation that it measures: "+y", "-rz", or components."""
+    direction, kind = (direction, "") if direction.any() else (axis, "r")
     at = int(np.argmax(abs(direction)))
     if abs(direction[at]) > 0.999:
-        return f"{'-' if direction[at] < 0 else '+'}{'xyz'[at]}"
-    return "(" + " ".join(f"{x:.2g}" for x in direction) + ")"
+        return f"{'-' if direction[at] < 0 else '+'}{kind}{'xyz'[at]}"
+    return kind + "(" + " ".join(f"{x:.2g}" for x in direction) + ")"
 
 
 def _fitted(flat: FloatArray) -> tuple[FloatArray, float, float]:
@@ -317,7 +325,7 @@ class SketchedPart(NamedTuple):
         return {name: np.mean(own, axis=0) for name, own in known.items() if own}
 
 
-def moved_parts(
+def _moved_parts(
     parts: Sequence[SketchedPart],
 ) -> tuple[list[dict[str, FloatArray]], dict[str, dict[int, FloatArray]]] | None:
     """Return places of nodes with all parts where they meet, and the ends of joints, m; None where a part meets none.
@@ -369,7 +377,7 @@ def assembly_sketch(parts: Sequence[SketchedPart], sensors: Sequence[str], hits:
     sensors, hits : sequence of str
         DOFs ``"A/7:y"``.
     """
-    placed = moved_parts(parts)
+    placed = _moved_parts(parts)
     if placed is None:
         return None
     moved, joints = placed

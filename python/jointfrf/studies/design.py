@@ -10,13 +10,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 
 from jointfrf.cases.catalogue import read_case_of
 from jointfrf.cases.keys import Case, StudyKeys
 from jointfrf.cases.kind import CaseKind, Estimator, Pollution, StudyChoice
+from jointfrf.choices import Arrangement
 from jointfrf.errors import FileContentError
 from jointfrf.kernel.arguments import as_names, check_choice, check_type, one_line
 from jointfrf.spelling import did_you_mean, some_of
@@ -34,7 +35,6 @@ __all__ = [
     "parse_factor",
 ]
 
-Arrangement = Literal["full", "one-at-a-time"]
 #: What a factor may be set to: the kinds of a TOML value.
 FactorValue = float | int | str | bool
 #: A point of a design: factor to value.

@@ -230,6 +230,7 @@ def _rows(link: BodyLink, number: Mapping[str, int], freq_hz: FloatArray) -> _Ro
         raise ValueError(f"links: {link.first[int(np.argmax(first == second))]} is connected with itself")
     if isinstance(link.joint, Joint):
         return _Rows(np.stack([first, second], 1), np.zeros(n, np.int32), link.joint.dynamic_stiffness(freq_hz))
+    link.joint.check_at_points("a link connects points")
     own = link.joint.connection(2 * np.pi * freq_hz)
     places = np.concatenate([first, second])
     plus, minus = (np.abs(own.pattern * (own.pattern * sign > 0)) for sign in (1, -1))

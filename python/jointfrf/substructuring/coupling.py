@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
 
 from jointfrf.frf.noise_model import estimate_noise
 from jointfrf.joint import Joint
@@ -123,8 +123,19 @@ def motions_across(h: ComplexArray, pattern: FloatArray) -> ComplexArray:
     -----
     A column of E has an entry or two: with many connections a dense product takes ten times as long.
     """
-    sparse_columns = sparse.csr_array(pattern)
-    return np.asarray(h.reshape(-1, h.shape[2]) @ sparse_columns).reshape(*h.shape[:2], pattern.shape[1])
+    found = np.zeros((*h.shape[:2], pattern.shape[1]), np.complex128)
+    for rows, factors in _entries(pattern.shape, pattern.tobytes()):
+        found += h[:, :, rows] * factors
+    return found
+
+
+@lru_cache(maxsize=8)  # a fit connects the same DOFs thousands of times
+def _entries(shape: tuple[int, ...], pattern: bytes) -> list[tuple[NDArray[np.intp], FloatArray]]:
+    """Return rows and values of the first, the second, ... entry of each column; the rest of a column is zero."""
+    values = np.frombuffer(pattern).reshape(shape)
+    is_entry = values != 0
+    rows = np.argsort(~is_entry, axis=0, kind="stable")[: int(is_entry.sum(axis=0).max(initial=0))]
+    return list(zip(rows, np.take_along_axis(values, rows, axis=0), strict=True))
 
 
 def connect(
@@ -229,6 +240,7 @@ def _coupled(
     for name, lines in (("h_a", a), ("h_b", b)):
         check_finite_lines(name, lines, freq_hz)
     h[:, :n_a, :n_a], h[:, n_a:, n_a:] = a, b
+    joint.check_at_points("couple connects points")
     link = joint.connection(2 * np.pi * freq_hz)
     pattern = np.zeros((n, link.pattern.shape[1]))
     pattern[np.concatenate([dofs[0], n_a + dofs[1]])] = link.pattern

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from jointfrf.choices import StiffnessMethod
 from jointfrf.kernel.arguments import (
     ComplexArray,
     as_dof_pairs,
@@ -25,9 +26,6 @@ from jointfrf.substructuring.modification import inverse_substructuring, ismm
 __all__ = ["STIFFNESS_METHODS", "JointFrfs", "StiffnessMethod", "decouple", "joint_stiffness"]
 
 Equation = Literal["rr", "rs", "sr", "ss"]
-StiffnessMethod = Literal[
-    "ismm", "ismm-kj", "inverse-substructuring", "decoupling-rr", "decoupling-rs", "decoupling-sr", "decoupling-ss"
-]
 #: What all decoupling equations need of the substructures.
 _SUBSTRUCTURES = ("h_a", "h_b", "dofs_j", "dofs_k")
 

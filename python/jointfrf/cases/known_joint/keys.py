@@ -34,6 +34,7 @@ from jointfrf.cases.substructures import (
     ChainKeys,
     MatricesKeys,
     ModelStructure,
+    PlateKeys,
     ReceptancesKeys,
     Structure,
 )
@@ -91,10 +92,10 @@ class KnownJointKeys(CaseKeys, tag="known-joint"):
     tag_absent = "`known-joint`"
     examples = {"frequency": {"first": 0.05, "last": 10.0, "step": 0.05}}  # noqa: RUF012
     substructure_a: Annotated[
-        ChainKeys | BeamKeys | BrickBeamKeys | MatricesKeys | ReceptancesKeys, key("Side j of the joint.")
+        ChainKeys | BeamKeys | PlateKeys | BrickBeamKeys | MatricesKeys | ReceptancesKeys, key("Side j of the joint.")
     ]
     substructure_b: Annotated[
-        ChainKeys | BeamKeys | BrickBeamKeys | MatricesKeys | ReceptancesKeys,
+        ChainKeys | BeamKeys | PlateKeys | BrickBeamKeys | MatricesKeys | ReceptancesKeys,
         key("Side k of the joint.", example={"masses": [4.0, 2.0], "stiffness": [2000.0, 2500.0],
                                             "damping": [2.0, 1.0], "ground": "end"}),
     ]  # fmt: skip

@@ -9,12 +9,13 @@ import numpy as np
 from msgspec import field
 
 from jointfrf.cases.keys import LIKE_DOFS, Case, CaseKeys, ExpectedKeys
-from jointfrf.cases.substructures import BeamKeys, BrickBeamKeys, ChainKeys, MatricesKeys, ModelStructure
+from jointfrf.cases.substructures import BeamKeys, BrickBeamKeys, ChainKeys, MatricesKeys, ModelStructure, PlateKeys
 from jointfrf.identification.model.assembly import AddedMass, Assembly
 from jointfrf.identification.model.substructure import Substructure, Unknown
-from jointfrf.laws.joint_toml import LAW_WORDS, parameters_in_words, read_law, takes_in_words
+from jointfrf.laws.joint_toml import parameters_in_words, read_law, takes_in_words
 from jointfrf.laws.law import JointLaw
 from jointfrf.laws.law_joint import LawJoint
+from jointfrf.laws.words import LAW_WORDS
 from jointfrf.models.model import Model
 from jointfrf.toml.declared import Keys, NotNegative, Positive, key
 
@@ -84,11 +85,11 @@ class ModelledJointKeys(CaseKeys, tag="modelled-joint"):
 
     examples = {"frequency": {"first": 5.0, "last": 400.0, "step": 2.0}, "study": {"realisations": 10}}  # noqa: RUF012
     substructure_a: Annotated[
-        ChainKeys | BeamKeys | BrickBeamKeys | MatricesKeys,
+        ChainKeys | BeamKeys | PlateKeys | BrickBeamKeys | MatricesKeys,
         key("Side j of the joint.", example={"model": "beam"}),
     ]
     substructure_b: Annotated[
-        ChainKeys | BeamKeys | BrickBeamKeys | MatricesKeys,
+        ChainKeys | BeamKeys | PlateKeys | BrickBeamKeys | MatricesKeys,
         key("Side k of the joint.", example={"model": "beam", "length": 0.225, "ends": ["free", "free"]}),
     ]
     points: Annotated[SidePointKeys, key("DOFs of the joint.")]

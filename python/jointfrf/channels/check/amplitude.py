@@ -125,12 +125,15 @@ def _peaks(freq_hz: FloatArray, h: ComplexArray) -> Iterator[tuple[list[int], _P
 
 def _reach(size: FloatArray) -> int:
     """Return how many lines beyond the first belong to its peak; 0 where it is none."""
-    lowest, reach = size[0], 0
+    top = lowest = float(size[0])
+    reach = 0
     for value in size[1 : _REACH + 1].tolist():
-        if value > size[0] or value > 2 * lowest or value < _SHARE * size[0]:
+        if value > top or value > 2 * lowest or value < _SHARE * top:
             break
-        lowest, reach = min(lowest, value), reach + 1
-    return reach if lowest < size[0] / _RISE else 0
+        if value < lowest:
+            lowest = value
+        reach += 1
+    return reach if lowest < top / _RISE else 0
 
 
 def _basis(x: FloatArray, poles: ComplexArray, powers: int) -> ComplexArray:
@@ -225,17 +228,29 @@ def _poles(x: FloatArray, h: ComplexArray, poles: ComplexArray) -> tuple[Complex
     h = h - parabola @ (parabola.T @ h)
     for _ in range(_STEPS):
         near = 1 / (x[:, None] - poles)
-        q, r = np.linalg.qr(near - parabola @ (parabola.T @ near))
+        q, r = _orthonormal(near - parabola @ (parabola.T @ near))
         if not abs(np.diagonal(r)).min() > TINY:
             return None
         inside = q.conj().T @ h
         residues = np.asarray(np.linalg.solve(r, inside), np.complex128)
-        slopes = (near.T**2)[:, :, None] * residues[:, None]
+        # The slope of h by a pole is its residues times 1 / (x - z)^2, less what parabola and poles explain of that.
+        slopes = near**2
+        descent = np.sum(slopes.conj() * ((h - q @ inside) @ residues.conj().T), axis=0)
         slopes -= parabola @ (parabola.T @ slopes)
         slopes -= q @ (q.conj().T @ slopes)
-        step = np.linalg.lstsq(slopes.reshape(n, -1).T, (h - q @ inside).ravel(), rcond=1e-10)[0]
+        normal = (slopes.conj().T @ slopes) * (residues.conj() @ residues.T)
+        step = np.linalg.solve(normal + TINY * np.eye(n), descent)
         step *= min(1.0, 0.5 * float(np.min(poles.imag / np.maximum(abs(step), TINY))))
         poles = poles + step
         if abs(step).max() < _FOUND:
             break
     return (poles, residues) if (poles.imag > 0).all() and abs(poles[0].real) < 1 else None
+
+
+def _orthonormal(columns: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    """Return an orthonormal basis of columns and their triangle: `numpy.linalg.qr`, which is slow for one column."""
+    if columns.shape[1] > 1:
+        q, r = np.linalg.qr(columns)
+        return q, r
+    size = max(float(np.linalg.norm(columns)), TINY)
+    return columns / size, np.full((1, 1), size + 0j)

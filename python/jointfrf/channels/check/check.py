@@ -21,6 +21,7 @@ from jointfrf.channels.check.channel_ratios import (
     unexplained_gains,
 )
 from jointfrf.channels.check.driving_points import (
+    Sectors,
     circles,
     convention_finding,
     mean_exponent,
@@ -39,12 +40,20 @@ from jointfrf.channels.check.exchange import (
 )
 from jointfrf.channels.check.pair_ratios import PairRatios, pair_ratios
 from jointfrf.channels.check.representation import representation_finding
+from jointfrf.channels.check.residues import (
+    LEAST_MODES,
+    driving_point_findings,
+    resonances,
+    signs_at,
+    strength_exponent,
+)
 from jointfrf.channels.check.result import Correction, FrfCheck, FrfFix, corrected
 from jointfrf.channels.check.rigid_findings import rigid_faults
 from jointfrf.channels.check.rigid_motion import ChannelGroup, not_rigid
 from jointfrf.channels.check.sides import reference_findings, side_findings
 from jointfrf.channels.check.signals import (
     LEAST_LINES,
+    LEAST_SMOOTHNESS,
     Measurement,
     as_channel_names,
     as_measurement,
@@ -55,6 +64,7 @@ from jointfrf.channels.joint_channels import JointChannels
 from jointfrf.errors import FileContentError, FrfCheckError
 from jointfrf.frf.bands import spread_lines
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
+from jointfrf.frf.noise_parts import is_smooth
 from jointfrf.kernel.arguments import (
     ComplexArray,
     FloatArray,
@@ -84,6 +94,8 @@ __all__ = [
 _BACKWARDS = 0.8
 #: Errors that the message of a fit that stops repeats.
 _STOPPED = 2
+#: A channel disagrees with all others if its pairs scatter so many times as much as every pair without it.
+_INCONSISTENT = 4.0
 #: Relative noise of channels that may hide small FRFs of joint DOFs, which are differences of large ones.
 _HIDING = 0.05
 
@@ -471,15 +483,25 @@ def _check_ratios(state: _Progress, m: Measurement, pairs: PairRatios) -> None:
             return
         ratios = _ratios(m, pairs)
     driving = _driving(m.square)
-    sector = sectors(driving)
+    sector, strength = sectors(driving), None
+    if m.rows.size == 1:  # no reciprocity: the other responses of the column show the modes
+        sector, strength = _of_column(state, m, sector)
     exponent = mean_exponent(m.omega, driving * m.omega[:, None] ** -ratios.power.astype(float))
     span = float(m.freq_hz[-1] / m.freq_hz[0])
-    found = quantities(ratios.group, ratios.power, ratios.sign, sector, exponent, span)
+    found = quantities(ratios.group, ratios.power, ratios.sign, sector, exponent, span, strength)
+    if strength is None and found.power.any():
+        # |h| between few resonances may rise with frequency as that of accelerances does; residues do not.
+        strength = strength_exponent(resonances(m.freq_hz, driving))
+        if strength is not None:
+            found = quantities(ratios.group, ratios.power, ratios.sign, sector, exponent, span, strength)
     state.add(quantity_findings(m, found, sector, state.read_as))
-    state.add(sign_findings(m, found, sector, state.side))
-    state.add(gain_findings(m, ratios, state.side))
+    gains = list(gain_findings(m, ratios, state.side))
+    is_else_reciprocal = not gains and not any(one.code == "reciprocity" for one in state.findings)
+    state.add(sign_findings(m, found, sector, state.side, may_rotate=is_else_reciprocal))
+    state.add(gains)
     state.add(delay_findings(m, ratios, state.side))
-    if not any(finding.code == "passivity" for finding in state.findings):
+    state.findings.extend(inconsistent_findings(m, pairs))
+    if not any(finding.code in ("passivity", "driving-point-residues") for finding in state.findings):
         left = state.corrected()
         noise = _noise(pairs, m.rows.size)
         delayed = {name for finding in state.findings if finding.code == "channel-delay" for name in finding.about}
@@ -489,6 +511,49 @@ def _check_ratios(state: _Progress, m: Measurement, pairs: PairRatios) -> None:
         active = passivity_findings(left, _driving(left.square), noise, inflation)
         # A delay of a force turns its driving point the other way than one of the response that was taken out.
         state.findings.extend(finding for finding in active if not delayed.issuperset(finding.about))
+
+
+def _of_column(state: _Progress, m: Measurement, sector: Sectors) -> tuple[Sectors, float | None]:
+    """Judge the only driving point by the resonances of its column; return its half plane and how residues grow."""
+    row, column = int(m.rows[0]), int(m.columns[0])
+    use = np.flatnonzero(
+        (m.smoothness[:, column] > LEAST_SMOOTHNESS) & ~np.isin(np.arange(len(m.responses)), [*state.bad_rows])
+    )
+    if row not in use:
+        return sector, None
+    found = resonances(m.freq_hz, m.h[:, use, column] * m.signs[0])
+    place = int(np.flatnonzero(use == row)[0])
+    findings = list(driving_point_findings(found, place, [m.responses[i] for i in use]))
+    state.findings.extend(findings)
+    signs = signs_at(found)[:, place]
+    quarter = sector.quarter
+    if findings:
+        quarter = np.full(1, -1)
+    elif np.count_nonzero(signs) >= LEAST_MODES:
+        quarter = np.full(1, 0 if signs.sum() > 0 else 2)
+    return replace(sector, quarter=quarter), strength_exponent(found)
+
+
+def inconsistent_findings(m: Measurement, pairs: PairRatios) -> Iterator[Finding]:
+    """Yield the channel that disagrees with all others by more than gain, delay and noise.
+
+    All its pairs h_pq / h_qp scatter far more than every pair without it, and smoothly over frequency: noise does not.
+    """
+    n, used = m.rows.size, np.flatnonzero(pairs.usable)
+    for channel in range(n) if n > 2 else ():
+        own = (pairs.p[used] == channel) | (pairs.q[used] == channel)
+        if not own.any() or own.all():
+            continue
+        scatter = pairs.scatter[used]
+        if scatter[own].min() < _INCONSISTENT * scatter[~own].max():
+            continue
+        p, q = pairs.p[used][own], pairs.q[used][own]
+        ratio = m.square[:, p, q] / m.square[:, q, p]
+        apart = np.log(np.where(np.isfinite(ratio) & (ratio != 0), ratio, 1))
+        apart = apart - np.median(apart.real, axis=0) - 1j * np.median(apart.imag, axis=0)
+        if is_smooth(apart.T):
+            numbers = {"scatter": float(np.median(scatter[own])), "others": float(scatter[~own].max())}
+            yield Finding("channel-inconsistent", numbers, (m.dofs[channel],))
 
 
 def _driving(h: ComplexArray) -> ComplexArray:
@@ -521,7 +586,7 @@ def _result(state: _Progress, freq: FloatArray, h: ComplexArray, good: np.ndarra
 
 
 def _unseen(measurement: Measurement) -> str:
-    common = "a gain that all channels share: stiffness and damping carry it one to one"
+    common = "a gain that all channels share: it changes stiffness and damping by the same factor"
     if measurement.rows.size < 2:
         return (
             f"{common}; fewer than two DOFs have both a response and a force, so gain, units and delay of channels are "

@@ -16,6 +16,7 @@ from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.messages.finding import Finding
 
 __all__ = [
+    "Sectors",
     "circles",
     "convention_finding",
     "mean_exponent",
@@ -208,6 +209,7 @@ def quantities(
     driving: Sectors,
     exponent: float,
     span: float,
+    strength: float | None = None,
 ) -> Quantities:
     """Combine powers and signs relative within each group with the half planes of the driving points.
 
@@ -220,13 +222,16 @@ def quantities(
         Mean exponent of w in the driving-point FRFs, less `power`.
     span : float
         Highest over lowest frequency.
+    strength : float, optional
+        Exponent of w in the residues of resonances, which a smooth background does not change. Few modes near a node or
+        a support may grow with frequency, so that a quantity is unlikely only by both exponents.
 
     Notes
     -----
     A response that is (i w)^q times a displacement, with sign s, turns its driving point by i^q s. Im < 0 is thus a
     receptance or an accelerance of the wrong sign: |h| falls with frequency in one and rises in the other.
     """
-    certain = span >= _LEAST_SPAN and not _RECEPTANCE < exponent < _ACCELERANCE
+    certain = strength is not None or (span >= _LEAST_SPAN and not _RECEPTANCE < exponent < _ACCELERANCE)
     found_power, found_sign = power.copy(), sign.copy()
     contradiction = np.zeros(group.size, bool)
     for number in np.unique(group):
@@ -242,6 +247,8 @@ def quantities(
                 wrong = (quarter >= 0) & ((own + 2 * (signs < 0)) % 4 != quarter)
                 # what is left of the exponent is that of receptances
                 unlikely = span >= _LEAST_SPAN and not _STEEPEST <= exponent - shift <= _ACCELERANCE
+                if strength is not None:
+                    unlikely = unlikely and abs(strength - shift) > 1
                 order = int(wrong.sum()), unlikely, shift == -2, int((signs < 0).sum()), abs(shift), shift, turn
                 choices.append((order, wrong))
         (*_, shift, turn), wrong = min(choices, key=lambda choice: choice[0])
@@ -303,10 +310,15 @@ def _quantity_and_action(power: int, read_as: str | None) -> tuple[str, str]:
 
 
 def sign_findings(
-    measurement: Measurement, found: Quantities, driving: Sectors, side: int
+    measurement: Measurement, found: Quantities, driving: Sectors, side: int, *, may_rotate: bool
 ) -> Iterator[Finding | Correction]:
-    """Report which responses point against the force of the same DOF."""
-    places = np.flatnonzero(found.sign < 0)
+    """Report which responses point against the force of the same DOF, or FRFs of a part that may rotate."""
+    places, contradicts = np.flatnonzero(found.sign < 0), found.contradiction
+    is_antisymmetric = bool(places.size and (contradicts == (found.sign < 0)).all())
+    if may_rotate and is_antisymmetric and (driving.quarter == 0).all():
+        # h_pq = -h_qp, but every driving point has the right sign: no channel is reversed.
+        yield Finding("gyroscopic", about=tuple(measurement.dofs[i] for i in places))
+        return
     if places.size:
         names = tuple(measurement.dofs[i] for i in places)
         every = places.size == found.sign.size
@@ -315,6 +327,6 @@ def sign_findings(
         yield Finding("driving-point-sign", numbers, names, variant=variant)
         name, own = measurement.of_side(side, places)
         yield Correction("sign", f"sign of {name} turned", side, own, -1.0)
-    for i in np.flatnonzero(found.contradiction):
+    for i in np.flatnonzero(contradicts):
         numbers = {"share": float(1 - driving.negative[i])}
         yield Finding("passivity", numbers, (measurement.dofs[i],), severity="error", variant="contradiction")

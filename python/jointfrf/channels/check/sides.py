@@ -70,7 +70,10 @@ def side_findings(
     span = float(freq_hz[-1] / freq_hz[0])
     group = np.zeros(2, np.intp)
     found = quantities(group, powers.astype(np.intp), signs.astype(np.intp), both, exponent, span)
-    for one in (*quantity_findings(named, found, both, read_as), *sign_findings(named, found, both, 1)):
+    for one in (
+        *quantity_findings(named, found, both, read_as),
+        *sign_findings(named, found, both, 1, may_rotate=False),
+    ):
         if isinstance(one, Finding) and one.code in ("quantity", "driving-point-sign"):
             yield one
     factor = math.exp(-log_factor.real)

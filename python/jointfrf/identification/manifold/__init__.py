@@ -12,11 +12,11 @@ starts          first coordinates from the compliance of single lines
 group_fit       the iteration: linearise, minimise, judge
 unknown_cross   the fit where cross terms of C are unknown
 estimate        strategies tried in order for every group of DOFs, put together
-beyond_noise    errors of models of the sides, parts of the band that disagree, channels a little off
-uncertainty     scatter between lines and parts of the band, intervals, test of the residual
+band_parts      separate fits of parts of the band
+uncertainty     the likelihood linearised; what noise, channels and sides add; intervals; test of the residual
 flexible_sides  the joint without its sides, by what bends among the channels
 fit             all of it: noise level, choice of damping, uncertainty
 
-What it shares with the likelihood of models is in `jointfrf.identification`: parameters, minimise, profile,
-scatter, calibration, residual_test, noise, line_starts. Smooth FRFs and the noise model come from `jointfrf.frf`.
+What it shares with the likelihood of models is in `jointfrf.identification`: linearised, mixed, parameters, minimise,
+profile, scatter, residual_test, noise, line_starts. Smooth FRFs and the noise model come from `jointfrf.frf`.
 """

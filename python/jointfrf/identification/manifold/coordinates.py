@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.choices import CrossTerms, DampingTerms
 from jointfrf.dofs import Parameter, ParameterKind, joint_parameters, parameters_shared, point_and_direction
 from jointfrf.identification.manifold.line_forms import LEAST_GAIN, STEPS, FormMinimum, JointCoordinates, LineForms
 from jointfrf.identification.minimise import inverse_information
@@ -37,12 +38,6 @@ __all__ = [
     "summed_terms",
 ]
 
-#: Terms of K* in addition to its stiffness.
-DampingTerms = Literal["none", "viscous", "hysteretic", "both"]
-#: Terms that couple the DOFs of a joint: none, and this is used; perhaps, but not sought; fitted between the DOFs of
-#: each point, none between points; fitted.
-CrossTerms = Literal["zero", "ignore", "points", "fit"]
-
 NumbersT = TypeVar("NumbersT", ComplexArray, FloatArray)
 
 _KINDS: Mapping[DampingTerms, tuple[ParameterKind, ...]] = {
@@ -53,10 +48,6 @@ _KINDS: Mapping[DampingTerms, tuple[ParameterKind, ...]] = {
 }
 #: Rates eta and w tau are limited: K* is then damping only.
 _LARGEST_RATE = 100.0
-#: Share of the largest rate beyond which a DOF is all damping.
-_ALL_DAMPING = 0.1
-#: Other starts are followed until a step gains less than this of the squares of one residual.
-_COARSE = 1e-2
 #: Relative standard error of a compliance from which on intervals come from the profile of the likelihood.
 _CURVED = 0.1
 #: Of a compliance with this relative error, damping is not known: its rate is taken below 1 where it is linearised.
@@ -294,49 +285,33 @@ class DiagonalJoint(SpringJoint):
         weighted = adjoint[:, :, None] * weight[:, self.dofs[:, None], self.dofs] * own[:, None, :]
         return (adjoint * residual[:, self.dofs]).real, weighted.real
 
+    @property
+    def kernel_terms(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """DOF of each coordinate, counted from 1, and its kind, as the kernel takes them."""
+        return (self.dofs + 1).astype(np.int32), self.terms.kinds.astype(np.int32)
+
     def minimise(
         self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = LEAST_GAIN
     ) -> FormMinimum:
         """Minimise quadratic forms in the kernel."""
-        p, n_freq = start.size, len(forms.squares)
-        sizes = (int(self.by_rate), self.n, p, n_freq, STEPS, 0 if held is None else held + 1)
-        x, information, gradient = np.array(start, np.float64), np.empty((p, p)), np.empty(p)
-        which = (self.dofs + 1).astype(np.int32), self.terms.kinds.astype(np.int32)
-        lines = (self.omega, *map(np.ascontiguousarray, forms))
-        args = (*sizes, least_gain, *which, self.lower, self.upper, *lines, x, information, gradient)
-        cost, _ = call_for_number("fit_diagonal_joint", args)
-        return FormMinimum(x, cost, information, gradient, forms, self)
+        return self._minimised("fit_diagonal_joint", forms, start, held, least_gain)
 
     def lowest(
         self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = LEAST_GAIN
     ) -> FormMinimum:
-        """Minimise; where a DOF ends rigid or all damping, also from no damping and from some.
+        """Minimise; where a DOF ends rigid or all damping, also from no damping and from some."""
+        return self._minimised("lowest_diagonal_joint", forms, start, held, least_gain)
 
-        A compliance and its rate are a vector in polar coordinates: at a = 0 nothing moves the rate any more, not even
-        from the wrong sign of damping.
-        """
-        found = self.minimise(forms, start, held, least_gain)
-        if self.rates.size == 0:
-            return found
-        n, of_rate = self.n, self.dofs[self.rates]
-        rate = abs(found.x[self.rates]) * (1.0 if self.by_rate else found.x[of_rate])
-        caught = found.x[:n] <= 0
-        np.logical_or.at(caught, of_rate, rate > _ALL_DAMPING * self.largest_rate)
-        if not caught.any():
-            return found
-        size = abs(forms.compliance).mean(axis=0)
-        for share in (0.0, 1.0):
-            x = found.x.copy()
-            x[:n] = np.where(caught, size, x[:n])
-            if held is not None:
-                x[held] = start[held]
-            other = share * self.rate_of_one / (1.0 if self.by_rate else np.maximum(x[of_rate], TINY))
-            moved = caught[of_rate] & (self.rates != held)
-            x[self.rates] = np.where(moved, other, x[self.rates])
-            there = self.minimise(forms, x, held, max(least_gain, _COARSE))
-            if there.cost < found.cost - _COARSE:
-                found = self.minimise(forms, there.x, held, least_gain)
-        return found
+    def _minimised(
+        self, routine: str, forms: LineForms, start: FloatArray, held: int | None, least_gain: float
+    ) -> FormMinimum:
+        p, n_freq = start.size, len(forms.squares)
+        sizes = (int(self.by_rate), self.n, p, n_freq, STEPS, 0 if held is None else held + 1)
+        x, information, gradient = np.array(start, np.float64), np.empty((p, p)), np.empty(p)
+        lines = (self.omega, *map(np.ascontiguousarray, forms))
+        args = (*sizes, least_gain, *self.kernel_terms, self.lower, self.upper, *lines, x, information, gradient)
+        cost, _ = call_for_number(routine, args)
+        return FormMinimum(x, cost, information, gradient, forms, self)
 
     def within_sight(self, minimum: FormMinimum, x: FloatArray) -> FloatArray:
         """Return where to linearise: no nearer to a rigid joint, nor at a larger rate, than the data resolve."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,6 +10,7 @@ from typing import NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from jointfrf.dofs import Parameter, ParameterKind, parameters_shared
 from jointfrf.frf.bands import spread_lines
@@ -22,7 +23,7 @@ from jointfrf.identification.manifold.coordinates import (
     LawCoordinates,
     coordinates_of,
 )
-from jointfrf.identification.manifold.group_fit import LITTLE_PATIENCE, LOST, GroupFit, GroupProblem, fit_dofs
+from jointfrf.identification.manifold.group_fit import LITTLE_PATIENCE, GroupFit, GroupProblem, fit_dofs
 from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold.line_forms import FormMinimum, NamedParameter
 from jointfrf.identification.manifold.on_manifold import LineData, OnManifold
@@ -35,8 +36,8 @@ __all__ = ["GroupData", "GroupStart", "JointEstimate", "assembled", "estimate_jo
 
 #: A compliance is not taken below this share of its standard error, nor of the receptances around it.
 _RIGID, _ROUNDING = 1e-3, 1e-12
-#: A fit that leaves cross terms unknown fits far better from this ratio of the mean squares on.
-_FAR_BETTER = 4.0
+#: Probability at which a fit that leaves cross terms unknown has smaller mean squares by chance; lines may correlate.
+_BY_CHANCE = 1e-6
 
 #: A group of DOFs that is fitted separately, and its FRFs.
 GroupData = tuple[NDArray[np.intp], LineData]
@@ -268,18 +269,20 @@ def _between(frfs: InterfaceFrfs, dofs: NDArray[np.intp]) -> tuple[ComplexArray,
 
 @dataclass(frozen=True)
 class _Search:
-    """The search for the joint of a group, with the fits that several strategies look at.
+    """The search for the joint of a group.
 
     Attributes
     ----------
     problem : GroupProblem
     terms : JointTerms or None
-        Of springs; None of laws, whose starts are given.
+        Terms of springs; None for laws, whose starts are given.
     cross : {"zero", "ignore", "points", "fit"}
     near : GroupStart, optional
-        What a fit to other FRFs of the same structure, or with other terms, has found.
+        Result of a fit to other FRFs of the same structure, or with other terms.
     is_explained : bool
         As in `estimate_joint`.
+    given : tuple of ndarray, shape (p,)
+        Initial values of laws.
     """
 
     problem: GroupProblem
@@ -289,10 +292,20 @@ class _Search:
     is_explained: bool = False
     given: tuple[FloatArray, ...] = ()
 
-    @cached_property
-    def starts(self) -> list[FloatArray]:
-        """Coordinates from the compliance of single lines, the likeliest first, or those given."""
-        return list(self.given) if self.terms is None else _starts_of_lines(self.problem.data, self.terms)
+    def ladder(self) -> Iterator[Sequence[FloatArray]]:
+        """Yield initial values, rung by rung, the likeliest first; a later rung costs fits of its own.
+
+        1. The compliance of single lines, or the values given. It is far off wherever noise hides gamma_jk, and in its
+           weakest direction the more the more entries it has.
+        2. For cross terms that are sought: the joint without them, which is stable there, and near enough.
+        3. For cross terms of zero: the diagonal of C, whatever its cross terms are.
+        """
+        joint = self.problem.joint
+        yield self.given if self.terms is None else _starts_of_lines(self.problem.data, self.terms)
+        if isinstance(joint, CoupledJoint) and joint.terms.has_cross_terms:
+            yield from ([start] for start in _simpler_joints(self.problem, joint))
+        elif joint.in_compliance and not self.problem.sides_bend:
+            yield [joint.coordinates(self.diagonal.joint.theta(self.diagonal.x))]
 
     @cached_property
     def diagonal(self) -> GroupFit:
@@ -302,22 +315,57 @@ class _Search:
         plain = self.problem._replace(data=data, joint=coordinates_of(self.terms))
         return fit_unknown_cross(plain, _starts_of_lines(data, self.terms))
 
-    @cached_property
-    def on_manifold(self) -> GroupFit:
-        """The fit without cross terms, from the compliance of single lines, then from the diagonal of C."""
-        return fit_dofs(self.problem, self._every_start())
-
-    def _every_start(self) -> Iterator[FloatArray]:
-        yield from self.starts
-        yield self.problem.joint.coordinates(self.diagonal.joint.theta(self.diagonal.x))
-
-    @property
-    def needs_cross_terms(self) -> bool:
-        """Whether no joint without cross terms is near the data, and the diagonal of C alone fits far better."""
-        found = self.on_manifold
-        if found.joint.n == 1 or found.is_good or self.problem.sides_bend or found.excess < LOST:
+    def needs_cross_terms(self, found: GroupFit) -> bool:
+        """Whether no joint without cross terms is near the data, or the diagonal of C alone fits better (F-test)."""
+        is_simple = found.joint.in_compliance and found.joint.n > 1
+        if not is_simple or found.is_good or self.problem.sides_bend:
             return False
-        return found.is_lost or found.excess > _FAR_BETTER * self.diagonal.excess
+        if found.is_lost:
+            return True
+        degrees = (2 * one.equations - one.x.size for one in (found, self.diagonal))
+        ratio = found.excess / max(self.diagonal.excess, TINY)
+        return bool(special.fdtrc(*(max(one, 1.0) for one in degrees), ratio) < _BY_CHANCE)
+
+
+def _fitted(search: _Search) -> GroupFit:
+    """Fit a group: near another fit if that explains the FRFs, else up the ladder of initial values."""
+    if search.cross == "ignore" and search.problem.joint.in_compliance:
+        return search.diagonal
+    if search.near is not None:
+        found = fit_dofs(search.problem, [search.near.x], LITTLE_PATIENCE, search.near.on)
+        if found.is_noise or search.is_explained:
+            return found
+    found = _lowest(search)
+    if not search.needs_cross_terms(found):
+        return found
+    statistics = search.diagonal.unknown_cross
+    assert statistics is not None
+    squares = found.excess * search.diagonal.equations
+    return replace(search.diagonal, unknown_cross=statistics._replace(noise_squares=squares))
+
+
+def _lowest(search: _Search) -> GroupFit:
+    """Go up the ladder until the residual is noise, and return the lowest fit.
+
+    A fit that comes near the data without converging may have left lines out on its way: it starts again from its end.
+    """
+    best: GroupFit | None = None
+
+    def lower(starts: Sequence[FloatArray]) -> GroupFit | None:
+        with suppress(np.linalg.LinAlgError):
+            found = fit_dofs(search.problem, starts)
+            return found if best is None or found.squares < best.squares else best
+        return best
+
+    for starts in search.ladder():
+        best = lower(starts)
+        if best is not None and (best.is_good or (search.problem.sides_bend and not best.is_lost)):
+            break
+    if best is not None and not best.converged and not best.is_lost:
+        best = lower([best.x])
+    if best is None:
+        raise np.linalg.LinAlgError("no start of the fit stays finite")
+    return best
 
 
 def _starts_of_lines(data: LineData, terms: JointTerms) -> list[FloatArray]:
@@ -326,32 +374,8 @@ def _starts_of_lines(data: LineData, terms: JointTerms) -> list[FloatArray]:
     return first_joints(data.on_lines(some), coordinates_of(terms.on_lines(some), data.springs))
 
 
-def _from_another_fit(search: _Search) -> GroupFit | None:
-    """Take the joint near another fit if its residual is noise, or if that is all that is asked."""
-    if search.near is None or search.cross == "ignore":
-        return None
-    found = fit_dofs(search.problem, [search.near.x], LITTLE_PATIENCE, search.near.on)
-    return found if found.is_noise or search.is_explained else None
-
-
-def _from_lines(search: _Search) -> GroupFit | None:
-    """Start from single lines where no cross term of C is assumed to be zero; then from the joint without them."""
-    problem, joint = search.problem, search.problem.joint
-    if joint.in_compliance:
-        return None
-    found = fit_dofs(problem, search.starts)
-    is_last = found.is_good or (problem.sides_bend and not found.is_lost)
-    if is_last or not isinstance(joint, CoupledJoint) or not joint.terms.has_cross_terms:
-        return found
-    return min([found, *_from_diagonal(problem, joint)], key=lambda one: one.squares)
-
-
-def _from_diagonal(problem: GroupProblem, joint: CoupledJoint) -> list[GroupFit]:
-    """Fit from the joint without cross terms, and from where that one started.
-
-    C of single lines is far off wherever noise hides gamma_jk, and in its weakest direction the more the more entries
-    it has. A joint without cross terms is stable there, if far from the data: it is near enough to start from.
-    """
+def _simpler_joints(problem: GroupProblem, joint: CoupledJoint) -> Iterator[FloatArray]:
+    """Yield initial values from the fit without cross terms, and from where that fit started."""
     terms, common = joint.terms.without_cross_terms()
     simple = DiagonalJoint(terms, problem.data.springs)
     some = spread_lines(len(problem.data.measured))
@@ -362,44 +386,9 @@ def _from_diagonal(problem: GroupProblem, joint: CoupledJoint) -> list[GroupFit]
     # Equal points start from their mean; cross terms, which no term here is, from 0.
     p = joint.lower.size
     points = np.maximum(np.bincount(common, minlength=p), 1)
-    found: list[GroupFit] = []
     for theta in map(simple.theta, ends):
-        if np.isfinite(theta).all() and not (found and found[-1].is_good):
-            with suppress(np.linalg.LinAlgError):
-                found.append(fit_dofs(problem, [np.bincount(common, theta, p) / points]))
-    return found
-
-
-def _with_cross_terms_ignored(search: _Search) -> GroupFit | None:
-    """Fit the diagonal of C alone if that was asked for."""
-    return search.diagonal if search.cross == "ignore" else None
-
-
-def _without_cross_terms(search: _Search) -> GroupFit | None:
-    """Fit with cross terms of zero, unless that stays far from the data."""
-    return None if search.needs_cross_terms else search.on_manifold
-
-
-def _with_cross_terms_unknown(search: _Search) -> GroupFit | None:
-    """Fit the diagonal of C: no joint without cross terms is near the data."""
-    statistics = search.diagonal.unknown_cross
-    assert statistics is not None
-    squares = search.on_manifold.excess * search.diagonal.equations
-    return replace(search.diagonal, unknown_cross=statistics._replace(noise_squares=squares))
-
-
-#: Ways to find the joint of a group, tried in this order until one applies.
-_STRATEGIES: tuple[Callable[[_Search], GroupFit | None], ...] = (
-    _from_another_fit,
-    _from_lines,
-    _with_cross_terms_ignored,
-    _without_cross_terms,
-    _with_cross_terms_unknown,
-)
-
-
-def _fitted(search: _Search) -> GroupFit:
-    return next(found for strategy in _STRATEGIES if (found := strategy(search)) is not None)
+        if np.isfinite(theta).all():
+            yield np.bincount(common, theta, p) / points
 
 
 def assembled(parameters: Sequence[NamedParameter], groups: Sequence[GroupFit]) -> JointEstimate:
@@ -424,7 +413,8 @@ def assembled(parameters: Sequence[NamedParameter], groups: Sequence[GroupFit]) 
         theta[kept],
         covariance[kept[:, None], kept],
         tuple(groups),
-        sum(group.noise_squares for group in groups) / degrees,
+        # Exact FRFs leave rounding of either sign.
+        max(sum(group.noise_squares for group in groups) / degrees, 0.0),
         sum(group.cost for group in groups) / degrees,
         equations,
     )

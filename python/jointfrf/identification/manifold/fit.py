@@ -13,16 +13,8 @@ from numpy.typing import NDArray
 
 from jointfrf.dofs import is_rotation, point_and_direction
 from jointfrf.errors import IllConditionedWarning
-from jointfrf.identification.calibration import student_factor
-from jointfrf.identification.manifold.beyond_noise import (
-    BandParts,
-    JointCalibration,
-    SideSpread,
-    fit_band_parts,
-    joint_calibration,
-    left_out_share,
-    side_spread,
-)
+from jointfrf.frf.noise_parts import line_correlation
+from jointfrf.identification.manifold.band_parts import BandParts, fit_band_parts, left_out_share
 from jointfrf.identification.manifold.coordinates import (
     CrossTerms,
     DampingTerms,
@@ -41,19 +33,22 @@ from jointfrf.identification.manifold.flexible_sides import JointAlone, SideBend
 from jointfrf.identification.manifold.group_fit import GroupFit
 from jointfrf.identification.manifold.line_forms import LEAST_GAIN, FormMinimum
 from jointfrf.identification.manifold.prepare import FitProblem, check_estimate
-from jointfrf.identification.manifold.uncertainty import joint_intervals, residual_test_of, spread_of
+from jointfrf.identification.manifold.uncertainty import (
+    JointUncertainty,
+    joint_intervals,
+    residual_test_of,
+    uncertainty_of_joint,
+)
 from jointfrf.identification.manifold.unknown_cross import compliance_lines
 from jointfrf.identification.profile import Intervals
 from jointfrf.identification.residual_test import ResidualTest
-from jointfrf.identification.scatter import Spread
-from jointfrf.kernel.arguments import FloatArray
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
 
 __all__ = [
     "MARGIN",
     "DofDamping",
     "ManifoldFit",
-    "Uncertainty",
     "choose_damping",
     "estimated_joint",
     "fit_laws",
@@ -129,31 +124,6 @@ class DofDamping(NamedTuple):
         return cls(dof, best, second, scores[second] - scores[best], others)
 
 
-class Uncertainty(NamedTuple):
-    """How well the parameters of a joint are known.
-
-    Attributes
-    ----------
-    spread : Spread
-        By how much variances exceed those from independent noise.
-    sides : SideSpread or None
-        What is not known of the sides adds to that; None where nothing is said of them.
-    parts : BandParts or None
-        Where lines that do not fit the joint were left out: whether parts of the band give it.
-    calibration : JointCalibration or None
-        What errors of channels that are smooth over frequency add; None where the FRFs show none.
-    covariance : ndarray, shape (p, p)
-    intervals : Intervals
-    """
-
-    spread: Spread
-    sides: SideSpread | None
-    parts: BandParts | None
-    calibration: JointCalibration | None
-    covariance: FloatArray
-    intervals: Intervals
-
-
 class ManifoldFit(NamedTuple):
     """Result of a fit on the manifold.
 
@@ -162,8 +132,11 @@ class ManifoldFit(NamedTuple):
     problem : FitProblem
         With the noise level that was used.
     estimate : JointEstimate
-    spread, sides, parts, calibration, covariance, intervals
-        As in `Uncertainty`.
+    known : JointUncertainty
+        How well the parameters are known.
+    parts : BandParts or None
+        Fits of parts of the band, where lines that do not fit the joint were left out.
+    intervals : Intervals
     test : ResidualTest
         The residual against the noise.
     alone : JointAlone or None
@@ -176,11 +149,8 @@ class ManifoldFit(NamedTuple):
 
     problem: FitProblem
     estimate: JointEstimate
-    spread: Spread
-    sides: SideSpread | None
+    known: JointUncertainty
     parts: BandParts | None
-    calibration: JointCalibration | None
-    covariance: FloatArray
     intervals: Intervals
     test: ResidualTest
     alone: JointAlone | None = None
@@ -201,20 +171,21 @@ class ManifoldFit(NamedTuple):
 def fit_springs(problem: FitProblem) -> ManifoldFit:
     """Fit a joint of springs and dampers, find its uncertainty, and compare its residual with the noise."""
     problem, found, choices = estimated_joint(problem)
-    known = uncertainty_of(problem, found, choices)
-    test = residual_test_of(found, problem.freq_hz, problem.noise.inflation, known.spread, known.calibration)
+    known, parts = uncertainty_of(problem, found, choices)
+    test = residual_test_of(found, problem.freq_hz, problem.noise.inflation, known)
     alone = None if problem.bending is None else _alone(problem, found, known, problem.bending)
-    return ManifoldFit(problem, found, *known, test, alone, _cross_fits(problem, found, test, choices), choices)
+    cross_fits = _cross_fits(problem, found, test, choices)
+    intervals = joint_intervals(found, known.factor, known.added)
+    return ManifoldFit(problem, found, known, parts, intervals, test, alone, cross_fits, choices)
 
 
-def _alone(problem: FitProblem, found: JointEstimate, known: Uncertainty, bending: SideBending) -> JointAlone:
+def _alone(problem: FitProblem, found: JointEstimate, known: JointUncertainty, bending: SideBending) -> JointAlone:
     """Return the compliance of the joint alone, from C of each line without what was added to the noise of channels."""
     n, freq = len(problem.dofs), problem.freq_hz
     frfs = problem.frfs if problem.deformation is None else problem.frfs.without(problem.deformation)
     value, spread = np.full((freq.size, n), np.nan, complex), np.full((freq.size, n), np.nan)
     fitted, size = np.full((3, n), np.nan), np.zeros(n)
-    factor = known.spread.factor
-    smooth = _with_calibration(known.spread, known.calibration) - factor
+    factor, smooth = known.spread.factor, known.smooth
     for group in found.groups:
         _, lines = compliance_lines(frfs.of_dofs(group.dofs))
         used = problem.used[:, group.dofs]
@@ -263,20 +234,10 @@ def fit_laws(problem: FitProblem, joint: LawJoint) -> ManifoldFit:
     def fit(own: FitProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
         return estimate_laws(own.frfs, joint, 2 * np.pi * own.freq_hz, own.used, own.options.same), ()
 
-    with _quiet():
-        problem, found, _ = _estimated(problem, fit)
-        inflation = problem.noise.inflation
-        calibration = joint_calibration(found, problem.frfs, problem.freq_hz, problem.noise.calibration)
-        spread = spread_of(
-            found, inflation, calibration, is_level_known=not problem.noise.is_assumed, motion=problem.motion
-        )
-        test = residual_test_of(found, problem.freq_hz, inflation, spread, calibration)
-    sides = side_spread(found, problem.frfs, None)
-    root = np.sqrt(spread.factor if sides is None else spread.factor + sides.factor)
-    covariance = found.covariance * np.outer(root, root) + (0 if calibration is None else calibration.covariance)
-    reach = None if sides is None else sides.std_error
-    intervals = joint_intervals(found, _with_calibration(spread, calibration), reach)
-    return ManifoldFit(problem, found, spread, sides, None, calibration, covariance, intervals, test)
+    problem, found, _ = _estimated(problem, fit)
+    known = _uncertainty(problem, found)
+    test = residual_test_of(found, problem.freq_hz, problem.noise.inflation, known)
+    return ManifoldFit(problem, found, known, None, joint_intervals(found, known.factor, known.added), test)
 
 
 def estimated_joint(problem: FitProblem) -> tuple[FitProblem, JointEstimate, tuple[DofDamping, ...]]:
@@ -293,37 +254,29 @@ def estimated_joint(problem: FitProblem) -> tuple[FitProblem, JointEstimate, tup
     return _estimated(problem, _with_damping)
 
 
-def uncertainty_of(problem: FitProblem, found: JointEstimate, choices: tuple[DofDamping, ...] = ()) -> Uncertainty:
-    """Return how well the parameters of a joint of springs are known."""
+def uncertainty_of(
+    problem: FitProblem, found: JointEstimate, choices: tuple[DofDamping, ...] = ()
+) -> tuple[JointUncertainty, BandParts | None]:
+    """Return how well the parameters of a joint of springs are known, and what parts of the band show."""
+    known = _uncertainty(problem, found, problem.added_compliance)
+    parts = _band_parts(problem, found, known, choices)
+    if parts is None:
+        return known, None
+    slope = np.ones(found.theta.size)
+    for group in found.groups:
+        slope[group.which] = np.where(group.joint.is_compliance, found.theta[group.which] ** 2, 1.0)
+    with np.errstate(invalid="ignore"):
+        covariance = known.covariance + np.diag(np.square(slope * parts.std_error))
+    return known._replace(added=np.hypot(known.added, parts.std_error), covariance=covariance), parts
+
+
+def _uncertainty(problem: FitProblem, found: JointEstimate, compliance: FloatArray | None = None) -> JointUncertainty:
     noise = problem.noise
     with _quiet():
-        calibration = joint_calibration(found, problem.frfs, problem.freq_hz, noise.calibration)
-    spread = spread_of(found, noise.inflation, calibration, is_level_known=not noise.is_assumed, motion=problem.motion)
-    sides = side_spread(found, problem.frfs, problem.added_compliance)
-    parts = _band_parts(problem, found, spread, choices)
-    added = [one.std_error for one in (sides, parts) if one is not None]
-    reach = np.sqrt(np.square(added).sum(axis=0)) if added else None
-    root = np.sqrt(spread.factor if sides is None else spread.factor + sides.factor)
-    with np.errstate(invalid="ignore"):
-        covariance: FloatArray = found.covariance * np.outer(root, root)
-        if parts is not None:
-            slope = np.ones(found.theta.size)
-            for group in found.groups:
-                slope[group.which] = np.where(group.joint.is_compliance, found.theta[group.which] ** 2, 1.0)
-            covariance += np.diag(np.square(slope * parts.std_error))
-        if calibration is not None:
-            covariance += calibration.covariance
-    intervals = joint_intervals(found, _with_calibration(spread, calibration), reach)
-    return Uncertainty(spread, sides, parts, calibration, covariance, intervals)
-
-
-def _with_calibration(spread: Spread, calibration: JointCalibration | None) -> FloatArray:
-    """Return variance factors for intervals, with smooth errors, whose variances are known from few channels."""
-    if calibration is None:
-        return spread.factor
-    found = calibration.factor * calibration.found
-    few = student_factor(spread.factor + calibration.factor - found, found, calibration.degrees)
-    return (spread.factor + calibration.factor) * few
+        return uncertainty_of_joint(
+            found, problem.freq_hz, noise.inflation, problem.frfs, noise.calibration, compliance, noise.mass,
+            noise.cross_axis, problem.position_errors, is_level_known=not noise.is_assumed, motion=problem.motion,
+        )  # fmt: skip
 
 
 def _estimated(
@@ -343,7 +296,27 @@ def _estimated(
     except np.linalg.LinAlgError as error:
         raise ValueError(f"no joint was found that fits gamma ({span}): {error}") from error
     check_estimate(found, problem.noise.level, span, is_level_known=not problem.noise.is_assumed)
-    return problem, found, more
+    return replace(problem, noise=replace(problem.noise, inflation=_inflation(problem, found))), found, more
+
+
+def _inflation(problem: FitProblem, found: JointEstimate) -> float:
+    """Return how many neighbouring lines carry the noise of one, at most as many as the residual of the fit shows.
+
+    A rational function that misses the FRFs leaves a residual that goes smoothly over frequency. If the correlation was
+    estimated from it, and not from differences of reciprocal FRFs, the residual at the joint limits it.
+    """
+    noise = problem.noise
+    if noise.model is None or noise.model.inflation_source != "residual":
+        return noise.inflation
+    rows, used, usual = list[ComplexArray](), 0, noise.model.line_factor == 1
+    for group in found.groups:
+        _, gradient = group.forms.at(group.joint.compliance(group.x))
+        size = np.sqrt(np.maximum(np.einsum("lqq->lq", group.forms.weight).real, 0))
+        size = np.where(usual[:, None], size, 0)
+        rows += list(np.where(size > 0, gradient / np.where(size > 0, size, 1), np.nan).T)
+        used += int(np.count_nonzero(size))
+    taken = len(found.parameters) / max(2 * used, 1)
+    return min(noise.inflation, line_correlation(np.array(rows), taken))
 
 
 @contextmanager
@@ -355,7 +328,7 @@ def _quiet() -> Iterator[None]:
 
 
 def _band_parts(
-    problem: FitProblem, result: JointEstimate, spread: Spread, choices: tuple[DofDamping, ...]
+    problem: FitProblem, result: JointEstimate, known: JointUncertainty, choices: tuple[DofDamping, ...]
 ) -> BandParts | None:
     """Fit parts of the band where lines were left out of the fit of all of it."""
     if problem.sides_bend or left_out_share(result) < _LEFT_OUT or problem.freq_hz.size < _FEW:
@@ -366,7 +339,7 @@ def _band_parts(
         part = replace(problem, freq_hz=problem.freq_hz[lines], frfs=frfs, used=problem.used[lines], near=())
         return _estimate(part, _chosen(problem, choices))
 
-    return fit_band_parts(result, problem.freq_hz, spread.information, fit)
+    return fit_band_parts(result, problem.freq_hz, known.spread.information, fit)
 
 
 def _chosen(problem: FitProblem, choices: tuple[DofDamping, ...]) -> DampingTerms | Sequence[DampingTerms]:
@@ -398,7 +371,7 @@ def _with_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping,
     if problem.options.cross in ("points", "fit") or problem.options.same:
         return _with_common_damping(problem)
     both = _estimate(problem, "both")
-    factor = problem.noise.inflation * max(both.scale, _LEAST_EXCESS if problem.noise.is_assumed else 1.0)
+    factor = _inflation(problem, both) * max(both.scale, _LEAST_EXCESS if problem.noise.is_assumed else 1.0)
     of_dof = {}
     for group in both.groups:
         for one in choose_damping(group, tuple(problem.dofs[d] for d in group.dofs), factor):
@@ -467,7 +440,7 @@ def _with_common_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofD
     results: dict[DampingTerms, JointEstimate] = {"viscous": _estimate(problem, "viscous")}
     near = (*_starts(problem, results["viscous"], "both"), *problem.near)
     both = results["both"] = _estimate(replace(problem, near=near), "both", data=results["viscous"].data)
-    factor = problem.noise.inflation * max(both.excess, _LEAST_EXCESS)
+    factor = _inflation(problem, both) * max(both.excess, _LEAST_EXCESS)
 
     def score(squares: float, p: int) -> float:
         return 2 * squares / factor + p * float(np.log(max(2 * both.equations / factor, 2.0)))

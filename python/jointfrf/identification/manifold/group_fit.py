@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from jointfrf.frf.bands import in_pieces, is_long
+from jointfrf.identification.manifold.coordinates import DiagonalJoint
 from jointfrf.identification.manifold.line_forms import FormMinimum, FormSquares, JointCoordinates, LineForms
 from jointfrf.identification.manifold.on_manifold import (
     LineData,
@@ -28,17 +29,16 @@ from jointfrf.identification.manifold.on_manifold import (
 )
 from jointfrf.identification.scatter import BLOCKS
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
+from jointfrf.kernel.call import call_for_number
 
 __all__ = [
     "FAR",
     "LITTLE_PATIENCE",
-    "LOST",
     "GroupFit",
     "GroupProblem",
     "UnknownCrossTerms",
     "effects_of",
     "fit_dofs",
-    "gradients_of",
 ]
 
 #: Linearisations at most.
@@ -56,7 +56,7 @@ _NOT_SMOOTHED, _BY_CHANCE, _LEVEL = 50, 1e-3, 2.0
 #: number lines that are not used do not come back.
 PATIENCE, LITTLE_PATIENCE = 8, 4
 #: A fit is far from the data when the squares exceed their number by this factor.
-LOST = 9.0
+_LOST = 9.0
 #: Fits whose squares differ by less have ended at the same place.
 _SAME = 1.0
 #: A residual may be noise up to this mean square, for what is not known of the noise, and so many standard deviations.
@@ -205,7 +205,7 @@ class GroupFit(FormMinimum):
     @property
     def is_lost(self) -> bool:
         """Whether it ended far from the data."""
-        return not self.converged and self.excess > LOST
+        return not self.converged and self.excess > _LOST
 
     @property
     def is_noise(self) -> bool:
@@ -242,11 +242,14 @@ def fit_dofs(
         FRFs near the smooth ones that nearly fit the joint: where their projection begins.
     """
     best: GroupFit | None = None
+    # The kernel fits a joint without cross terms; one of laws, with cross terms or unknown entries is fitted here.
+    own = _KernelFit.of(problem)
     for start in itertools.islice(starts, _FEW_STARTS if problem.sides_bend else None):
         if not np.isfinite(start).all():
             continue
         try:
-            found = _iterated(problem, start, patience if best is None else LITTLE_PATIENCE, on)
+            now = patience if best is None else LITTLE_PATIENCE
+            found = _iterated(problem, start, now, on) if own is None else own.fit(start, now, on)
         except np.linalg.LinAlgError:  # K* ran off to infinity: another start may do
             continue
         again = best is not None and found.is_noise and abs(found.squares - best.squares) < _SAME
@@ -257,33 +260,6 @@ def fit_dofs(
     if best is None:
         raise np.linalg.LinAlgError("no start of the fit stays finite")
     return best
-
-
-def gradients_of(fit: GroupFit, changes: Iterable[ComplexArray]) -> FloatArray:
-    """Return by how much changes of the measured FRFs change the gradient at the minimum, shape (number, p).
-
-    Parameters
-    ----------
-    fit : GroupFit
-    changes : iterable of ndarray, shape (n_freq, q)
-        Of the entries of gamma, m/N.
-    """
-    problem, data, used = fit.problem, fit.problem.data, fit.used.astype(float)
-    if problem.unknown.any():
-        return _gradients_beside(fit, changes)
-    c = fit.joint.matrix(fit.forms.compliance)
-    on = _rescued(data, c, _first_points(data, c))
-    adjoint = fit.joint.slope(fit.x, fit.joint.compliance(fit.x)).conj()
-
-    def gradients(targets: tuple[ComplexArray, ...]) -> list[FloatArray]:
-        found, _ = _of_coordinates(problem, normal_forms(data, c, on, targets))
-        return [np.einsum("lqp,lq,l->p", adjoint, one.gradient, used).real for one in found]
-
-    # Together they share what is linearised: as many at once as take no more memory than the lines do.
-    (base,), found, more = gradients((data.smooth,)), [], iter(changes)
-    while some := tuple(data.smooth + change for change in itertools.islice(more, _AT_ONCE)):
-        found += [one - base for one in gradients(some)]
-    return np.array(found)
 
 
 def effects_of(
@@ -327,18 +303,47 @@ def effects_of(
             yield np.where(np.isfinite(gradient), gradient, 0), np.where(np.isfinite(squares), squares, 0)
 
 
-def _gradients_beside(fit: GroupFit, changes: Iterable[ComplexArray]) -> FloatArray:
-    """Return the same where cross terms are unknown: there is no point of the manifold, but C of the smooth FRFs."""
-    data, n = fit.problem.data, fit.joint.n
-    diagonal = np.arange(n)
-    base = smooth_compliance(data)[:, diagonal, diagonal]
-    adjoint = fit.joint.slope(fit.x, fit.joint.compliance(fit.x)).conj()
-    found = []
-    for change in changes:
-        moved = smooth_compliance(data._replace(smooth=data.smooth + change))[:, diagonal, diagonal] - base
-        weighted = np.einsum("lqr,lr->lq", fit.forms.weight[:, :n, :n], np.nan_to_num(moved))
-        found.append(np.einsum("lqp,lq->p", adjoint[:, :n], weighted).real)
-    return np.array(found).reshape(-1, fit.x.size)
+class _KernelFit(NamedTuple):
+    """The fit of a joint of springs without cross terms in the kernel, with the arrays that it takes."""
+
+    problem: GroupProblem
+    joint: DiagonalJoint
+    equations: FloatArray
+    frfs: tuple[NDArray[Any], ...]
+
+    @classmethod
+    def of(cls, problem: GroupProblem) -> _KernelFit | None:
+        """Return the fit of a problem; None where the kernel has none."""
+        data, joint = problem.data, problem.joint
+        if not isinstance(joint, DiagonalJoint) or data.springs is None or problem.unknown.any():
+            return None
+        # Packed: entries as a column of each line.
+        frfs = [np.ascontiguousarray(one)[:, None] for one in (data.smooth, data.measured, data.inverse_std)]
+        return cls(problem, joint, problem.equations(), (*frfs, data.whitening))
+
+    def fit(self, start: FloatArray, patience: int, on: OnManifold | None) -> GroupFit:
+        """Fit from one start."""
+        data, joint, p, n_freq = self.problem.data, self.joint, start.size, len(self.equations)
+        n, is_near = joint.n, on is not None and on.h.shape == (n_freq, joint.n, joint.n)
+        sizes = int(data.entries.reciprocal), n, p, data.entries.rows.size, 1, data.whitening_order, n_freq
+        options = 2 if is_near else 1, patience, int(self.problem.sides_bend), _LinesUsed(self.problem).farthest
+        x, springs = np.array(start, np.float64), np.array(data.reference, np.float64)
+        h, q = np.array((on.h, on.q) if on is not None and is_near else np.zeros((2, n_freq, n, n)), np.complex128)
+        values, descent = np.empty((2, p))
+        covariance, information = np.empty((2, p, p))
+        line_descent, distance, used = np.empty((n_freq, p)), np.empty(n_freq), np.empty(n_freq, np.int32)
+        forms = LineForms(
+            np.empty((n_freq, n), np.complex128), np.empty((n_freq, n, n), np.complex128),
+            np.empty((n_freq, n), np.complex128), np.empty(n_freq),
+        )  # fmt: skip
+        results = values, covariance, information, descent, line_descent, distance, used, *forms
+        args = *sizes, *options, *joint.kernel_terms, joint.omega, *self.frfs, springs, x, h, q, *results
+        cost, equations, steps, converged, _ = call_for_number("fit_joint", (*args, np.empty(n_freq, np.int32)))
+        return GroupFit.of(
+            FormMinimum(x, cost, information, descent, forms, joint), problem=self.problem, used=used == 1,
+            equations=equations, possible=float(self.equations.sum()), iterations=int(steps),
+            converged=bool(converged), on=None if is_long(n_freq) else OnManifold(h, q, distance),
+        )  # fmt: skip
 
 
 def _iterated(
@@ -371,7 +376,7 @@ def _iterated(
         change, count = minimum.x - x, float(equations[used].sum())
         # In standard errors along the direction of the step: what the data do not see may go anywhere.
         moved = float(np.sqrt(abs(2 * (change @ minimum.information @ change))))
-        is_lost = minimum.cost > LOST * count
+        is_lost = minimum.cost > _LOST * count
         converged = choice_of_m.holds_for(minimum, step) and bool(moved < _MOVED * np.sqrt(x.size)) and is_whole
         if length.is_spent and not converged and moved < _SWINGS * np.sqrt(x.size):
             # Between the two ends, a tenth of the way of which was the last step.

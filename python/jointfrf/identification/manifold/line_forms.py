@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.frf.bands import is_long, line_slices
-from jointfrf.identification.minimise import Linearised, inverse_information, minimise
+from jointfrf.identification.minimise import NormalEquations, inverse_information, minimise
 from jointfrf.identification.scatter import LineParts
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
@@ -107,10 +107,10 @@ class FormSquares:
         """Return the sum of the squares; inf where K* is singular."""
         return self._at(x)[0]
 
-    def linearised(self, x: FloatArray) -> Linearised:
+    def linearised(self, x: FloatArray) -> NormalEquations:
         """Return it with its derivatives."""
         cost, entries, residual = self._at(x)
-        return Linearised(cost, *self.joint.normal_equations(x, entries, self.forms.weight, residual))
+        return NormalEquations(cost, *self.joint.normal_equations(x, entries, self.forms.weight, residual))
 
 
 @dataclass(frozen=True)

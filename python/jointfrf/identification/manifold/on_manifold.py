@@ -190,12 +190,11 @@ class LineData(NamedTuple):
         return 0 if self.correlation is None else self.correlation.shape[1]
 
     @property
-    def weighing(self) -> tuple[FloatArray, FloatArray]:
-        """Weights and whitening as the kernel takes them."""
-        weights = self.entries.matrix(self.inverse_std)
-        if self.correlation is None:
-            return weights, np.zeros((len(weights), 1, 1))
-        return weights, np.ascontiguousarray(self.correlation)
+    def whitening(self) -> FloatArray:
+        """The whitening matrices as the kernel takes them; numbers that it does not read where there are none."""
+        return (
+            np.zeros((len(self.smooth), 1, 1)) if self.correlation is None else np.ascontiguousarray(self.correlation)
+        )
 
 
 class OnManifold(NamedTuple):
@@ -297,7 +296,8 @@ def normal_forms(data: LineData, r: ComplexArray, on: OnManifold, targets: tuple
 
 def _lines(data: LineData, gamma: ComplexArray, r: ComplexArray) -> tuple[NDArray[Any], ...]:
     """Return springs, FRFs, weights, whitening and R as the kernel takes them."""
-    return data.reference, gamma, *data.weighing, np.ascontiguousarray(r, np.complex128)
+    weights = data.entries.matrix(data.inverse_std)
+    return data.reference, gamma, weights, data.whitening, np.ascontiguousarray(r, np.complex128)
 
 
 def starts_on_manifold(data: LineData, r: ComplexArray, steps: int) -> OnManifold:
@@ -462,7 +462,8 @@ def expected_m(data: LineData, r: ComplexArray, on: OnManifold, prior: PriorOfM)
     line_info = np.empty(len(r), np.int32)
     sizes = (int(data.entries.reciprocal), data.entries.n, data.whitening_order, len(r))
     spread = np.ascontiguousarray(prior.size)
-    known = prior.share, spread, data.reference, *data.weighing, np.ascontiguousarray(r)
+    weights = data.entries.matrix(data.inverse_std)
+    known = prior.share, spread, data.reference, weights, data.whitening, np.ascontiguousarray(r)
     call("expect_with_springs", [*sizes, *known, h, q, line_info])
     bad = line_info != 0
     h[bad], q[bad] = on.h[bad], on.q[bad]

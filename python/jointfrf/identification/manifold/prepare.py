@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.channels.joint_channels import LeftOutDof, left_out_dofs
-from jointfrf.dofs import point_and_direction
+from jointfrf.dofs import is_rotation, point_and_direction
 from jointfrf.frf.bands import Band, as_bands, in_bands, line_slices, spread_lines
+from jointfrf.frf.cross_axis import CrossAxis, found_cross_axis
 from jointfrf.frf.entry_groups import ZERO
 from jointfrf.frf.quantiles import medians
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
@@ -24,7 +25,7 @@ from jointfrf.identification.manifold.transforms import (
     as_transforms,
     deformation_variance,
 )
-from jointfrf.identification.noise import KnownNoise, NoiseOptions, noise_of_matrix
+from jointfrf.identification.noise import KnownNoise, NoiseOptions, SmoothedFrfs, noise_of_matrix, without_mass
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_dof_names
 from jointfrf.identification.side_models import SideModel, corrected_frfs
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, check_choice, one_line
@@ -53,6 +54,7 @@ class FitOptions:
     cross: CrossTerms
     reciprocal: bool
     same: tuple[tuple[str, ...], ...] = ()
+    position_error: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the words."""
@@ -97,6 +99,8 @@ class FitProblem:
         DOFs that are not sought, but whose motion the channels take for one that is.
     motion : ndarray, shape (n_freq,), optional
         Size of the motion on each line, if the FRFs depend on amplitude.
+    position_errors : tuple of ndarray, shapes (n_errors, 2 n, 2 n), optional
+        Joint DOFs that errors of the positions mix, as `Transforms.position_errors`.
     """
 
     dofs: tuple[str, ...]
@@ -113,6 +117,7 @@ class FitProblem:
     model_errors: tuple[str, ...] | None = None
     left_out: tuple[LeftOutDof, ...] = ()
     motion: FloatArray | None = None
+    position_errors: tuple[FloatArray, FloatArray] | None = None
 
     @property
     def sides_bend(self) -> bool:
@@ -163,10 +168,12 @@ def prepare_compliance(
     sides: tuple[SideModel, SideModel] | None = None,
     *,
     is_checked: bool = False,
+    is_reciprocal: bool = True,
 ) -> FitProblem:
     """Check the arguments of the fit, find the noise, and keep the lines in the bands; as in `identify`.
 
-    `is_checked` says that the channels show the joint DOFs: those of other noise on the same FRFs did.
+    `is_checked` says that the channels show the joint DOFs: those of other noise on the same FRFs did. `is_reciprocal`
+    says that of FRFs without errors h_pq = h_qp, which those of joints that depend on amplitude are not.
     """
     freq, h = measured.freq_hz, measured.h
     transforms = as_transforms(transform, h)
@@ -185,10 +192,13 @@ def prepare_compliance(
     noise = noise.on_lines(kept, measured.h.shape)
     # Whether channels are the same points is known where both transforms are one.
     square = h.shape[1] == h.shape[2] and np.array_equal(responses, forces)
+    is_square = options.reciprocal and square
     if not is_checked:
         _check_joint_dofs(transforms, h, names)
-    found = noise_of_matrix(freq, h, noise, reciprocal=options.reciprocal and square)
-    if options.reciprocal and square and not _is_symmetrised(found.smooth):
+    h, found = _without_errors(
+        freq, h, noise, names, transforms, is_square=is_square, has_shares=is_reciprocal and sides is None
+    )
+    if is_square and not _is_symmetrised(found.smooth):
         # Few lines are not smoothed.
         found = found._replace(smooth=mean_of_directions(found.smooth, direction_share(found.variance)))
     smooth, variance = transforms.gamma(found.smooth), found.variance
@@ -226,7 +236,60 @@ def prepare_compliance(
         added_compliance=transforms.compliance,
         model_errors=None if corrected is None else corrected.error_names,
         left_out=() if transforms.geometry is None else left_out_dofs(h, transforms.geometry),
+        position_errors=_position_errors(transforms, options.position_error),
     )
+
+
+def _position_errors(transforms: Transforms, size: float) -> tuple[FloatArray, FloatArray] | None:
+    """Return the joint DOFs that errors of positions mix, if these are stated; `size` in m."""
+    found = transforms.position_errors(size) if size else None
+    if size and found is None:
+        raise ValueError(
+            "position_error needs rotations among the joint DOFs and the positions of the channels: give transform as "
+            "an Interface (interface, virtual_interface), or leave position_error out"
+        )
+    return found
+
+
+def _without_errors(
+    freq: FloatArray,
+    h: ComplexArray,
+    noise: NoiseOptions,
+    names: tuple[str, ...],
+    transforms: Transforms,
+    *,
+    is_square: bool,
+    has_shares: bool,
+) -> tuple[ComplexArray, SmoothedFrfs]:
+    """Return FRFs without the mass of a sensor and shares of other DOFs in the channels, and their noise.
+
+    FRFs that differ from their transpose are smooth only without the shares. The mean of both directions shows the
+    shares first, whose noise is in their differences as well, and then smooth FRFs. Without `has_shares` none are
+    sought.
+    """
+    rotations = np.array([is_rotation(name) for name in names])
+    # Without a transform the channels are the joint DOFs.
+    is_translation = not transforms.are_units or not rotations.any()
+
+    def off_axis(smooth: ComplexArray) -> CrossAxis | None:
+        return found_cross_axis(freq, h, smooth, transforms.responses, rotations, is_translation=is_translation)
+
+    def with_noise(axis: CrossAxis | None, smooth: ComplexArray) -> tuple[ComplexArray, SmoothedFrfs]:
+        own = h if axis is None else axis.removed(h, smooth)
+        own, mass = without_mass(freq, own, noise.sensor_mass, is_square=is_square, is_translation=is_translation)
+        found = noise_of_matrix(freq, own, noise, reciprocal=is_square)
+        return own, found._replace(noise=replace(found.noise, mass=mass, cross_axis=axis))
+
+    if not (is_square and has_shares) or noise.setups is not None:
+        return with_noise(None, h)
+    mean: ComplexArray = h + h.swapaxes(1, 2)
+    mean /= 2
+    first = off_axis(mean)
+    if first is None:
+        del mean  # of a long sweep as large as all that the fit keeps
+        return with_noise(None, h)
+    found = with_noise(first, mean)
+    return with_noise(off_axis(found[1].smooth), found[1].smooth)
 
 
 def _for_models(transforms: Transforms) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:

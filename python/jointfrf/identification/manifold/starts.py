@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.frf.bands import in_pieces
-from jointfrf.identification.manifold.coordinates import SpringJoint, summed_terms
+from jointfrf.identification.manifold.coordinates import DiagonalJoint, SpringJoint, summed_terms
 from jointfrf.identification.manifold.line_forms import LineForms
 from jointfrf.identification.manifold.on_manifold import LineData
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.call import call
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.substructuring.compliance import compliance_covariance, joint_compliance
 
@@ -35,7 +36,7 @@ def first_joints(data: LineData, joint: SpringJoint) -> list[FloatArray]:
     C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj of the smooth FRFs on every line, with the covariance that a share of
     the noise gives it, and from it R = (1 + C Z)^-1 C; lines on which noise hides gamma_jk count little.
     """
-    n, is_diagonal = data.entries.n, joint.in_compliance
+    n = data.entries.n
     a = range(n)
 
     def of_lines(own: slice) -> list[NDArray[Any]]:
@@ -48,18 +49,18 @@ def first_joints(data: LineData, joint: SpringJoint) -> list[FloatArray]:
             compliance, covariance = _with_springs(compliance, covariance, data.springs)
         good = np.isfinite(compliance).all(axis=(1, 2)) & np.isfinite(covariance).all(axis=(1, 2)) & np.isfinite(ratio)
         variance = covariance.reshape(-1, n, n, n, n)[:, a, a, a, a].real
-        return [good, compliance, variance, ratio] if is_diagonal else [good, compliance, variance, ratio, covariance]
+        return [good, compliance, variance, ratio, covariance]
 
+    if isinstance(joint, DiagonalJoint):
+        return _diagonal_starts(data, joint)
     good, *found = in_pieces(len(data.smooth), of_lines, _PIECE)
     if not good.any():
         return []
-    compliance, own, ratio, *covariance = (x[good] for x in found)
+    compliance, own, ratio, covariance = (x[good] for x in found)
     here = joint.on_lines(np.flatnonzero(good))
     threshold = _HIDDEN if np.count_nonzero(ratio < _HIDDEN) > 2 * joint.lower.size else float(np.median(ratio))
     line_weight = 1 / (1 + (ratio / threshold) ** 8)
-    if is_diagonal:
-        return _diagonal_starts(compliance[:, a, a], own, line_weight, here)
-    return _coupled_starts(compliance, covariance[0], own, line_weight, here)
+    return _coupled_starts(compliance, covariance, own, line_weight, here)
 
 
 def _with_springs(
@@ -100,22 +101,16 @@ def _hidden(gamma: ComplexArray, spread: FloatArray) -> FloatArray:
     return ratio
 
 
-def _diagonal_starts(
-    value: ComplexArray, variance: FloatArray, line_weight: FloatArray, joint: SpringJoint
-) -> list[FloatArray]:
-    """Fit the compliance of each DOF separately."""
-    n, p = joint.n, joint.lower.size
-    information = line_weight[:, None] / np.maximum(variance, np.finfo(float).tiny)
-    mean = (information * value.real).sum(axis=0) / information.sum(axis=0)
-    error = 1 / np.sqrt(information.sum(axis=0))
-    weight = np.zeros((len(value), n, n), np.complex128)
-    weight[:, range(n), range(n)] = information
-    forms = LineForms(value, weight, np.zeros_like(value), np.zeros(len(value)))
-    start = np.zeros(p)
-    start[:n] = np.maximum(mean, error)
-    found = joint.minimise(forms, start).x
-    found[:n] = np.maximum(found[:n], 1e-3 * error)
-    return [found, start]
+def _diagonal_starts(data: LineData, joint: DiagonalJoint) -> list[FloatArray]:
+    """Return the starts of a joint without cross terms from the kernel: least squares of R, and its mean undamped."""
+    entries, p = data.entries, joint.lower.size
+    found = np.empty((2, p))
+    # Packed: entries as a column of each line.
+    sizes = int(entries.reciprocal), entries.n, p, entries.rows.size, 1, len(data.smooth)
+    frfs = (np.ascontiguousarray(one)[:, None] for one in (data.smooth, data.inverse_std))
+    lines = joint.omega, data.reference, *frfs
+    call("start_joint", (*sizes, *joint.kernel_terms, *lines, *found))
+    return list(found) if found.any() else []
 
 
 def _coupled_starts(

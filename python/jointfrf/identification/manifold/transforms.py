@@ -33,8 +33,8 @@ class Transforms(NamedTuple):
     responses, forces : ndarray, shapes (2 n, m_r), (2 n, m_f)
     response_modes, force_modes : ndarray, shapes (m_r, 2 n), (m_f, 2 n), or None
         Rigid motion of the channels, where it is known.
-    geometry : Interface or None
-        Of the responses, where it is known.
+    geometry, force_geometry : Interface or None
+        Geometry of the responses and of the forces, if it is known.
     compliance : ndarray, shape (n,), or None
         What the sides add to the compliance of the joint DOFs, where that was said.
     """
@@ -45,6 +45,7 @@ class Transforms(NamedTuple):
     force_modes: FloatArray | None = None
     geometry: Interface | None = None
     compliance: FloatArray | None = None
+    force_geometry: Interface | None = None
 
     @property
     def are_units(self) -> bool:
@@ -72,6 +73,25 @@ class Transforms(NamedTuple):
         if forces is None:
             forces = modes_of(self.forces, smooth.swapaxes(1, 2))
         return self._replace(response_modes=responses, force_modes=forces)
+
+    def position_errors(self, size: float) -> tuple[FloatArray, FloatArray] | None:
+        """Return the joint DOFs that errors of positions mix, of responses and of forces, shapes (n_errors, 2 n, 2 n).
+
+        Each channel is off its stated place by `size`, m, along one axis. Channels that are both responses and forces
+        are points of the structure: one error moves the sensor and the impact. None if the positions are not known, or
+        if no joint DOF depends on them.
+        """
+        if self.geometry is None or self.force_geometry is None:
+            return None
+        mixed = [
+            np.einsum("dm,ame->amde", transform, size * own.mode_slopes).reshape(-1, *[len(transform)] * 2)
+            for transform, own in ((self.responses, self.geometry), (self.forces, self.force_geometry))
+        ]
+        if self.geometry is not self.force_geometry:
+            mixed = [np.concatenate(own) for own in ((mixed[0], 0 * mixed[1]), (0 * mixed[0], mixed[1]))]
+        moved = [one.any(axis=(1, 2)) for one in mixed]
+        either = moved[0] | moved[1]
+        return (mixed[0][either], mixed[1][either]) if either.any() else None
 
     @property
     def channels(self) -> tuple[ChannelModes, ChannelModes] | None:
@@ -115,6 +135,7 @@ def as_transforms(transform: Transform | tuple[Transform, Transform] | None, h: 
         response_modes=None if known[0] is None else known[0].modes,
         force_modes=None if known[1] is None else known[1].modes,
         geometry=known[0],
+        force_geometry=known[1],
         compliance=np.max(compliances, axis=0) if compliances else None,
     )
 

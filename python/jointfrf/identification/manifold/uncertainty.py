@@ -1,39 +1,45 @@
-"""Uncertainty of the parameters: scatter between lines and parts of the band, and intervals."""
+"""Uncertainty of the parameters of a joint: the likelihood on the manifold linearised, intervals, residual test."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from jointfrf.frf.bands import in_pieces, line_slices
-from jointfrf.identification.manifold.beyond_noise import JointCalibration
+from jointfrf.frf.calibration import CalibrationErrors
+from jointfrf.frf.cross_axis import CrossAxis
+from jointfrf.frf.moving_mass import MovingMass
+from jointfrf.identification.linearised import Linearised, LineParts
 from jointfrf.identification.manifold.estimate import JointEstimate
-from jointfrf.identification.manifold.group_fit import FAR, GroupFit
+from jointfrf.identification.manifold.group_fit import FAR, GroupFit, effects_of
+from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold.line_forms import FormMinimum, FormSquares
 from jointfrf.identification.minimise import inverse_information
+from jointfrf.identification.mixed import (
+    Added,
+    Effect,
+    added_by,
+    mass_effects,
+    parameter_ratio,
+    smooth_effects,
+    student_factor,
+)
 from jointfrf.identification.profile import Intervals, ProfileIntervals
 from jointfrf.identification.residual_test import ResidualTest, Trend, local_excess
-from jointfrf.identification.scatter import (
-    BLOCKS,
-    Scatter,
-    Spread,
-    block_members,
-    chi_squared,
-    scatter_of,
-    spread_of_scatters,
-)
-from jointfrf.kernel.arguments import TINY, FloatArray
+from jointfrf.identification.scatter import BLOCKS, Spread, chi_squared, spread_of
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
 __all__ = [
-    "block_scatter",
+    "GroupLinearised",
+    "JointUncertainty",
     "joint_intervals",
-    "line_scatter",
     "profile_interval",
     "residual_test_of",
-    "spread_of",
+    "uncertainty_of_joint",
 ]
 
 #: Probability at which parts of the band disagree on a parameter, and how many must show it.
@@ -44,111 +50,257 @@ _SINGULAR = 1e8
 _PRECISE = 1e-3
 
 
-def line_scatter(group: GroupFit) -> tuple[FloatArray, FloatArray]:
-    """Variance of the coordinates of a group from the scatter between single lines, and its degrees of freedom.
+@dataclass(frozen=True)
+class GroupLinearised(Linearised):
+    """The likelihood of a group of joint DOFs at its minimum, measured by the channels of `frfs`."""
 
-    Returns
-    -------
-    variance, degrees : ndarray, shape (p,)
+    group: GroupFit
+    frfs: InterfaceFrfs | None = None
 
-    Notes
-    -----
-    As `scatter_of`, each line being a part.
+    def __post_init__(self) -> None:
+        """Take what the group knows."""
+        group, p = self.group, self.group.x.size
+        slope = group.joint.theta_slope(group.x)
+        # Noise is nearly normal in a compliance, and a rigid DOF has no finite slope.
+        in_coordinate = group.joint.is_compliance | ~np.isfinite(slope).all(axis=1)
+        known = {
+            "n_freq": len(group.forms.squares),
+            "information": 2 * group.information,
+            "covariance": group.covariance,
+            "determined": np.ones(p, np.bool_),
+            "slope": np.where(in_coordinate[:, None], np.eye(p), slope),
+            "priors": LineParts(np.zeros((0, p)), np.zeros((0, p, p))),
+        }
+        vars(self).update(known)
+
+    @property
+    def measured_shape(self) -> tuple[int, int]:
+        """Numbers of responses and forces."""
+        shape = (0, 0) if self.frfs is None else self.frfs.measured.shape[1:]
+        return shape[0], shape[1]
+
+    def lines(self, which: slice) -> LineParts:
+        """Return the parts of some lines."""
+        gradient, information = self.group.of_lines(which)
+        return LineParts(2 * gradient, 2 * information)
+
+    def errors(self, masks: NDArray[np.bool_], lines: slice) -> Iterator[tuple[ComplexArray, FloatArray]]:
+        """Yield the effect of a relative error of 1 of the FRFs in each mask."""
+        assert self.frfs is not None
+        frfs = self.frfs.on_lines(lines)
+        yield from self.changes((self._entries(frfs, mask) for mask in masks), lines)
+
+    def _entries(self, frfs: InterfaceFrfs, mask: NDArray[np.bool_]) -> ComplexArray:
+        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        own = np.where(mask[np.ix_(rows, columns)], frfs.measured[:, rows[:, None], columns], 0)
+        change = frfs.responses[:, rows] @ own @ frfs.forces[:, columns].T
+        return frfs.entries_of(self.group.dofs, np.asarray(change, np.complex128))
+
+    def changes(self, of_entries: Iterator[ComplexArray], lines: slice) -> Iterator[tuple[ComplexArray, FloatArray]]:
+        """Yield the effect of changes of the entries of gamma, shape (n_lines, q), m/N."""
+        for gradient, squares in effects_of(self.group, of_entries, lines):
+            yield 2 * gradient, squares
+
+    def cross_axis_effects(self, found: CrossAxis | None) -> list[Effect]:
+        """Return shares of other joint DOFs in the channels: the sum of impact and sensor varies as their difference.
+
+        The mean of h_pq and h_qp contains the sum only.
+        """
+        if found is None or self.frfs is None:
+            return []
+        gamma, transform = self.frfs.smooth_gamma, found.transform
+
+        def changes(which: NDArray[np.intp]) -> Iterator[ComplexArray]:
+            for q, d, variance in zip(found.channels[which], found.dofs[which], found.variance[which], strict=True):
+                yield gamma[:, :, d, None] * (np.sqrt(variance) * transform[:, q])
+
+        return [self._effect(changes(which), float(which.size)) for which in found.alike]
+
+    def position_effects(self, errors: tuple[FloatArray, FloatArray] | None) -> list[Effect]:
+        """Return errors of the positions of channels, of one standard deviation."""
+        if errors is None or self.frfs is None:
+            return []
+        gamma = self.frfs.smooth_gamma
+        return [self._effect(rows @ gamma + gamma @ columns.T for rows, columns in zip(*errors, strict=True))]
+
+    def _effect(self, changes: Iterable[ComplexArray], degrees: float = np.inf) -> Effect:
+        """Return errors of variance 1 that change FRFs between the joint DOFs, each of shape (n_freq, 2 n, 2 n)."""
+        frfs, group = self.frfs, self.group
+        assert frfs is not None
+        entries = (frfs.entries_of(group.dofs, change) for change in changes)
+        own = [
+            (group.band_parts @ line.real, rest.sum()) for line, rest in self.changes(entries, slice(0, self.n_freq))
+        ]
+        columns, squares = (np.array(one) for one in zip(*own, strict=True))
+        return Effect(columns, 1.0, degrees, float(squares.sum()))
+
+    def side_effects(self, compliance: FloatArray | None) -> list[Effect]:
+        """Return errors of the models that corrected the FRFs, and of a compliance that the sides add, m/N.
+
+        The first are off by one standard deviation. The second has itself as standard deviation.
+        """
+        group, found, every = self.group, list[Effect](), slice(0, self.n_freq)
+        errors = None if self.frfs is None else self.frfs.errors_of(group.dofs)
+        if errors is not None and errors.shape[1]:
+            own = [group.band_parts @ line.real for line, _ in self.changes(iter(errors.swapaxes(0, 1)), every)]
+            # Lines that are in no part of the band weigh nothing.
+            found.append(Effect(np.array(own), 1.0))
+        if compliance is not None:
+            steps = 2 * _softer(group, compliance[group.dofs]) @ self.covariance
+            of_compliance = group.joint.is_compliance
+            if of_compliance.any():
+                # Whatever the damping takes up of it.
+                own_step = np.diag(compliance[group.dofs])[:, of_compliance[: len(group.dofs)]]
+                steps[:, of_compliance] = own_step / group.joint.compliance_slope(group.x)[of_compliance]
+            found.append(Effect((steps @ self.information)[:, None], 1.0))
+        return found
+
+
+def _softer(group: GroupFit, compliance: FloatArray) -> FloatArray:
+    """Return by how much the gradient changes when the compliance of each DOF is larger, shape (n, p)."""
+    joint, forms = group.joint, group.forms
+    entries = joint.compliance(group.x)
+    adjoint = joint.slope(group.x, entries).conj()
+    # dR = (1 - R Z) dC (1 - Z R)
+    kept = np.eye(joint.n) - joint.matrix(entries) * joint.springs
+    change = np.einsum("lad,d,lbd->ldab", kept, compliance, kept)[:, :, joint.rows, joint.columns]
+    weighted = np.einsum("lqr,ldr->ldq", forms.weight, change)
+    found: FloatArray = np.einsum("lqp,ldq->dp", adjoint, weighted).real
+    return found
+
+
+class _GroupUncertainty(NamedTuple):
+    """Uncertainty of one group of DOFs: smooth errors are what channels and set-ups have, sides are not among them."""
+
+    at: GroupLinearised
+    smooth: list[Effect]
+    smooth_added: Added
+    spread: Spread
+
+
+class JointUncertainty(NamedTuple):
+    """Uncertainty of all parameters of a joint.
+
+    Attributes
+    ----------
+    groups : tuple
+        Uncertainty of each group of DOFs.
+    spread : Spread
+        Variance factors by scatter, of all parameters.
+    smooth, factor : ndarray, shape (p,)
+        Variance factors of intervals: by smooth errors of channels, and by these and `spread` together.
+    added : ndarray, shape (p,)
+        Standard error by the sides, to be added in `joint_intervals`.
+    covariance : ndarray, shape (p, p)
+        Covariance of the parameters.
+    excess, excess_error : float
+        Mean square of the residual that smooth errors leave, in units of the noise, and its standard deviation.
     """
-    pieces = line_slices(len(group.forms.squares))
-    return scatter_of(group.information, (group.of_lines(own) for own in pieces))
+
+    groups: tuple[_GroupUncertainty, ...]
+    spread: Spread
+    smooth: FloatArray
+    factor: FloatArray
+    added: FloatArray
+    covariance: FloatArray
+    excess: float = 0.0
+    excess_error: float = 0.0
 
 
-def block_scatter(
-    group: GroupFit, blocks: int = BLOCKS, motion: FloatArray | None = None
-) -> tuple[FloatArray, FloatArray]:
-    """Variance of the coordinates of a group from the scatter between parts of the band, and its degrees of freedom.
-
-    With `motion`, shape (n_freq,), the parts are lines of similar motion instead.
-
-    Returns
-    -------
-    variance, degrees : ndarray, shape (p,)
-        NaN and 0 where there are fewer than two lines a block.
-
-    Notes
-    -----
-    It needs no noise model, and includes what the model of the joint cannot follow over frequency. As `line_scatter`
-    with parts of the band for lines; with equal parts that is the block jackknife to first order. A part that holds
-    most of the information on a parameter leaves few degrees of freedom.
-    """
-    p, n_freq = group.x.size, len(group.forms.squares)
-    (diagonal,) = in_pieces(n_freq, lambda own: [np.einsum("lpp->lp", group.of_lines(own).information)])
-    lines = np.flatnonzero(group.used & diagonal.any(axis=1))
-    if lines.size < 2 * blocks:
-        return np.full(p, np.nan), np.zeros(p)
-    if motion is not None:
-        lines = lines[np.argsort(motion[lines], kind="stable")]
-    size = np.maximum(np.diagonal(group.information), TINY)
-    member = block_members(diagonal / size, lines, blocks)
-    found = group.of_groups(member)
-    return scatter_of(found.information.sum(axis=0), [found])
-
-
-def spread_of(
+def uncertainty_of_joint(
     found: JointEstimate,
+    freq_hz: FloatArray,
     inflation: float,
-    calibration: JointCalibration | None = None,
+    frfs: InterfaceFrfs | None = None,
+    errors: CalibrationErrors | None = None,
+    compliance: FloatArray | None = None,
+    mass: MovingMass | None = None,
+    cross_axis: CrossAxis | None = None,
+    position_errors: tuple[FloatArray, FloatArray] | None = None,
     *,
     is_level_known: bool = True,
     motion: FloatArray | None = None,
-) -> Spread:
-    """Return by how much the variance of each parameter exceeds that from independent noise, as `spread_of_scatters`.
+) -> JointUncertainty:
+    """Return the uncertainty of the parameters by noise, scatter, channels and sides.
 
     Parameters
     ----------
     found : JointEstimate
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
     inflation : float
         By how much correlation between lines makes the variance of a mean larger, at least 1.
-    calibration : JointCalibration, optional
-        What smooth errors add: the residual and the scatter between blocks are compared with noise and these together.
+    frfs : InterfaceFrfs, optional
+        FRFs of the channels; needed for errors of these.
+    errors : CalibrationErrors, optional
+        Smooth errors of channels and set-ups.
+    compliance : ndarray, shape (n,), optional
+        Compliance that the sides add to each joint DOF, m/N or rad/(N m).
+    mass : MovingMass, optional
+        Mass of a sensor that was removed from the FRFs.
+    cross_axis : CrossAxis, optional
+        Shares of other joint DOFs in the channels.
+    position_errors : tuple of ndarray, shapes (n_errors, 2 n, 2 n), optional
+        Joint DOFs that errors of the positions of channels mix.
     is_level_known : bool
-        Whether the noise is known; otherwise its level is that of the residual.
+        Whether the noise is known; if not, the residual gives its level.
     motion : ndarray, shape (n_freq,), optional
         Size of the motion on each line, if the FRFs depend on amplitude.
     """
-    excess, beside = (0.0, 0.0) if calibration is None else (calibration.excess, calibration.factor)
+    p = len(found.parameters)
+    columns, equations = list[tuple[GroupLinearised, list[Effect], Added]](), max(found.equations - p / 2, 1.0)
+    for group in found.groups:
+        at = GroupLinearised(group, frfs)
+        smooth = smooth_effects(at, errors, freq_hz, at.measured_shape, group.band_parts)
+        if frfs is not None:
+            smooth += mass_effects(at, mass, freq_hz, frfs.measured, group.band_parts)
+        smooth += at.cross_axis_effects(cross_axis) + at.position_effects(position_errors)
+        columns.append((at, smooth, added_by(smooth, at)))
+    excess = sum(added.squares for *_, added in columns) / equations
+    error = float(np.linalg.norm([added.squares_error for *_, added in columns])) / equations
     scale = max(found.scale / (1 + excess), 1.0) if is_level_known else found.scale
-    by_noise = np.full(len(found.parameters), inflation * scale)
-    lines, blocks = Scatter.none(by_noise.size), Scatter.none(by_noise.size)
-    for group in found.groups:
-        own = np.diagonal(group.covariance)
-        for both, (variance, degrees), more in (
-            (lines, line_scatter(group), inflation), (blocks, block_scatter(group), 1.0),
-        ):  # fmt: skip
-            with np.errstate(divide="ignore", invalid="ignore"):
-                both.factor[group.which] = np.where(own > 0, more * variance / own, np.nan)
-            both.degrees[group.which] = degrees / more
-    spread = spread_of_scatters(by_noise, lines, blocks, beside=beside)
-    if motion is None:
-        return spread
-    between = Scatter.none(by_noise.size)
-    for group in found.groups:
-        variance, degrees = block_scatter(group, motion=motion)
-        own = np.diagonal(group.covariance)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            between.factor[group.which] = np.where(own > 0, variance / own, np.nan)
-        between.degrees[group.which] = degrees
-    return spread.between_amplitudes(between)
+    groups, covariance = list[_GroupUncertainty](), found.covariance.copy()
+    factor, of_smooth, of_sides = np.zeros((3, p))
+    spreads = np.ones((4, p))
+    for at, smooth, added in columns:
+        spread = spread_of(at, inflation * scale, inflation, parameter_ratio(added.covariance, at), motion)
+        sides, which, joint = added_by(at.side_effects(compliance), at), at.group.which, at.group.joint
+        spreads[:, which] = spread
+        factor[which] = _interval_factor(spread, added, at)
+        of_smooth[which] = factor[which] - spread.factor
+        own = np.einsum("ij,jk,ik->i", at.slope, sides.covariance, at.slope)
+        of_sides[which] = np.sqrt(np.maximum(own, 0)) * joint.compliance_slope(at.group.x)
+        root, slope = np.sqrt(spread.factor), joint.theta_slope(at.group.x)
+        with np.errstate(invalid="ignore"):
+            own = slope @ (added.covariance + sides.covariance) @ slope.T
+            whole = covariance[which[:, None], which] * np.outer(root, root)
+        covariance[which[:, None], which] = whole + np.nan_to_num(own, posinf=0.0, neginf=0.0)
+        groups.append(_GroupUncertainty(at, smooth, added, spread))
+    return JointUncertainty(
+        tuple(groups), Spread(*spreads), of_smooth, factor, of_sides, covariance, float(excess), error
+    )
+
+
+def _interval_factor(spread: Spread, added: Added, at: Linearised) -> FloatArray:
+    """Return the variance factor of an interval, with Student's t for the part that was estimated."""
+    more = parameter_ratio(added.covariance, at)
+    estimated = more * added.estimated
+    whole = spread.factor + more
+    return np.asarray(whole * student_factor(whole - estimated, estimated, added.degrees))
 
 
 def joint_intervals(found: JointEstimate, factor: FloatArray, added: FloatArray | None = None) -> Intervals:
     """Return the intervals of all parameters.
 
-    Symmetric in the coordinate of a parameter in which noise is nearly normal; by profile likelihood where it is not.
+    Symmetric in the coordinate of a parameter if noise is nearly normal in it; else by profile likelihood.
 
     Parameters
     ----------
     found : JointEstimate
     factor : ndarray, shape (p,)
-        By how much the variance of each parameter exceeds that from independent noise.
+        Variance of each parameter over its variance for independent noise.
     added : ndarray, shape (p,), optional
-        Standard error of each parameter that is not in this; of the compliance where that is its coordinate.
+        Standard error of each parameter in addition to this; of the compliance if a compliance is its coordinate.
     """
     more = np.zeros_like(factor) if added is None else added
     place = {which: (group, i) for group in found.groups for i, which in enumerate(group.which.tolist())}
@@ -163,13 +315,12 @@ def joint_intervals(found: JointEstimate, factor: FloatArray, added: FloatArray 
             own = _with_kind(own, kind, group.joint.names[i], float(factor[which]), probability)
         if not more[group.which].any():
             return own
-        reach = float(special.ndtri((1 + probability) / 2)) * float(more[which])
         if group.joint.may_be_rigid(i) and not group.joint.is_stiffness[i]:
             stiffness = int(group.which[group.joint.dofs[i]])
             if not np.isfinite(limits(stiffness, probability)[1]):
                 # A rigid DOF shows no damping.
                 return -np.inf, np.inf
-        return _widened(group, i, own, reach)
+        return _widened(group, i, own, float(special.ndtri((1 + probability) / 2)) * float(more[which]))
 
     def of_function(
         function: Callable[[FloatArray], float], used: NDArray[np.intp], probability: float
@@ -218,10 +369,7 @@ def _limits(group: FormMinimum, i: int, factor: float, probability: float) -> tu
 
 
 def _widened(group: GroupFit, i: int, limits: tuple[float, float], reach: float) -> tuple[float, float]:
-    """Return the limits of a parameter with another, independent error of this reach.
-
-    Of a stiffness it is one of the compliance, as it comes from compliance between the channels.
-    """
+    """Return the limits of a parameter with an independent error of this reach, of the compliance for a stiffness."""
     (low, high), joint = limits, group.joint
     theta = float(joint.theta(group.x)[i])
     if joint.is_compliance[i] and theta > 0:
@@ -243,9 +391,9 @@ def profile_interval(group: FormMinimum, i: int, factor: float, probability: flo
     Parameters
     ----------
     group : FormMinimum
-        Of a group of DOFs.
+        Fit of a group of DOFs.
     i : int
-        Parameter among those of the group.
+        Number of the parameter in the group.
     factor : float
         By how much the variance exceeds that from independent noise.
     probability : float
@@ -257,8 +405,8 @@ def profile_interval(group: FormMinimum, i: int, factor: float, probability: flo
 
     Notes
     -----
-    The squares are the quadratic forms of the last linearisation. Of springs without cross terms they are those of
-    values of the compliance a = 1/k >= 0, or of the damping.
+    The squares are the quadratic forms of the last linearisation. For springs
+    without cross terms, the coordinate held is the compliance a = 1/k >= 0, or the damping.
     """
     joint = group.joint.of_profile(i)
     best = group if joint is group.joint else joint.lowest(group.forms, joint.coordinates(group.joint.theta(group.x)))
@@ -282,13 +430,9 @@ def _may_be_rigid(group: FormMinimum, dof: int, factor: float, probability: floa
 
 
 def residual_test_of(
-    found: JointEstimate,
-    freq_hz: FloatArray,
-    inflation: float,
-    spread: Spread,
-    calibration: JointCalibration | None = None,
+    found: JointEstimate, freq_hz: FloatArray, inflation: float, known: JointUncertainty
 ) -> ResidualTest:
-    """Compare the residual with the noise.
+    """Compare the residual with the noise and the smooth errors of channels.
 
     Parameters
     ----------
@@ -297,24 +441,18 @@ def residual_test_of(
         Hz.
     inflation : float
         By how much correlation between lines makes the variance of a mean larger.
-    spread : Spread
-        Variance factors of the parameters.
-    calibration : JointCalibration, optional
-        What smooth errors add: the residual is compared with noise and these together.
+    known : JointUncertainty
 
     Notes
     -----
     A mean square of N complex residuals has the standard deviation 1/sqrt(N), its root half of that; the noise level,
-    found from as many data, has the same. Parts of the band agree on a parameter where the squares of their differences
-    from the whole, over their variance, are those of chi^2.
+    found from as many data, has the same. Parts of the band agree on a parameter if the squares of their
+    differences from the whole, over their variance, follow chi^2.
     """
+    added = 1 + known.excess
     sigma = float(np.sqrt(2 * inflation / max(found.equations, 1.0)) / 2)
-    added = 1.0
-    if calibration is not None:
-        added += calibration.excess
-        sigma = float(np.hypot(sigma, calibration.excess_error / added / 2))
-    factor = np.fmax(np.maximum(spread.information, inflation), spread.lines)
-    trends = tuple(t for group in found.groups for t in _trends(group, freq_hz, factor[group.which], calibration))
+    sigma = float(np.hypot(sigma, known.excess_error / added / 2))
+    trends = tuple(t for one in known.groups for t in _trends(one, freq_hz, inflation))
     ratio, of_all = float(np.sqrt(found.excess / added)), _ratio_of_all(found) / np.sqrt(added)
     test = ResidualTest(ratio, sigma, trends=trends, of_all=of_all)
     if not test.is_large:
@@ -342,10 +480,10 @@ def _ratio_of_all(found: JointEstimate) -> float:
     return float(np.sqrt(squares / max(equations - len(found.parameters) / 2, 1)))
 
 
-def _trends(
-    group: GroupFit, freq_hz: FloatArray, factor: FloatArray, calibration: JointCalibration | None
-) -> list[Trend]:
+def _trends(known: _GroupUncertainty, freq_hz: FloatArray, inflation: float) -> list[Trend]:
     """Return the parameters that parts of the band disagree on."""
+    group, spread = known.at.group, known.spread
+    factor = np.fmax(np.maximum(spread.information, inflation), spread.lines)
     lines = np.flatnonzero(group.used)
     p = group.x.size
     if lines.size < BLOCKS * (p + 2):
@@ -368,20 +506,20 @@ def _trends(
         changes[seen] = step @ slope.T
         variance = np.einsum("ij,bjk,ik->bi", slope, covariance - whole, slope)
         variance = np.maximum(variance, 0) * factor
-        if calibration is not None:
-            more = calibration.between(group, seen, 2 * covariance)
+        for effect in known.smooth:
+            more = effect.between(covariance, seen, whole)
             variance += np.einsum("ij,bjk,ik->bi", slope, more, slope)
         errors[seen] = np.sqrt(variance)
     found = []
     for i, name in enumerate(group.joint.names):
-        known = np.isfinite(changes[:, i]) & (errors[:, i] > 0)
+        shown = np.isfinite(changes[:, i]) & (errors[:, i] > 0)
         # A part that does not see the parameter says nothing about it.
-        known &= errors[:, i] < abs(theta[i])
-        if np.count_nonzero(known) < _LEAST_PARTS:
+        shown &= errors[:, i] < abs(theta[i])
+        if np.count_nonzero(shown) < _LEAST_PARTS:
             continue
-        squares = ((changes[known, i] / errors[known, i]) ** 2).sum()
-        probability = float(special.chdtrc(np.count_nonzero(known) - 1, squares))
+        squares = ((changes[shown, i] / errors[shown, i]) ** 2).sum()
+        probability = float(special.chdtrc(np.count_nonzero(shown) - 1, squares))
         if probability < _DISAGREE / p:
             centres = member @ freq_hz / member.sum(axis=1)
-            found.append(Trend(name, centres[known], values[known, i], probability))
+            found.append(Trend(name, centres[shown], values[shown, i], probability))
     return found

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.dofs import direction_names, is_rotation
 from jointfrf.identification.model.substructure import FrfSource, Substructure, Unknown, check_same_lines
@@ -24,6 +24,7 @@ from jointfrf.kernel.arguments import (
     one_line,
 )
 from jointfrf.laws.law_joint import Connection, LawJoint, joined
+from jointfrf.models.points import Region
 from jointfrf.spelling import did_you_mean
 from jointfrf.substructuring.coupling import connect
 
@@ -37,6 +38,8 @@ __all__ = [
     "Places",
     "assembly_connection",
     "check_joint_order",
+    "connection_entries",
+    "joint_connection",
     "places_of",
 ]
 
@@ -71,6 +74,40 @@ class Places:
 
 
 @dataclass(frozen=True)
+class JointPorts:
+    """Ports of the joints of an assembly.
+
+    Attributes
+    ----------
+    dof : ndarray of int, shape (n,)
+        Number of the joint DOF of each port.
+    term : ndarray of int, shape (n,)
+        Which of the ports of this DOF it is.
+    weight : ndarray, shape (n,)
+        Factor of the values of the joint.
+    ends : pair of tuple of str, length n
+        Its names on sides j and k; ``""`` is the ground.
+    """
+
+    dof: NDArray[np.intp]
+    term: NDArray[np.intp]
+    weight: FloatArray
+    ends: tuple[tuple[str, ...], tuple[str, ...]]
+
+    @cached_property
+    def is_plain(self) -> bool:
+        """Whether every port is a DOF, of weight 1."""
+        return not self.term.any() and bool((self.weight == 1).all())
+
+    def columns(self, pattern: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Return, for each column of a connection of ports, the column of the DOFs and the term."""
+        n = len(pattern) // 2
+        rows = abs(pattern).argmax(axis=0) % n  # of a law both sides, of a mass its own
+        terms = [np.arange((self.dof == row).sum()) for row in rows]
+        return np.repeat(np.arange(rows.size), [own.size for own in terms]), np.concatenate(terms)
+
+
+@dataclass(frozen=True)
 class PlacedJoint:
     """A joint between DOFs of two substructures, or between one and the ground.
 
@@ -79,12 +116,16 @@ class PlacedJoint:
     joint : LawJoint or Joint
         Its laws; a `Joint` becomes springs and dampers. Its values are where a fit may start.
     j, k : sequence of str
-        Its DOFs on either side, ``"frame/3:y"``, in its order; no `k` is the ground.
+        Its DOFs on either side, ``"frame/3:y"``, in its order; no `k` is the ground. ``"plate/edge:z"`` of a region
+        makes the values of the joint those per length or area.
+    weight : float
+        Factor of all its stiffness, damping and mass, such as the length that belongs to a node. Joints that are the
+        `same` have equal values and any weights.
 
     Raises
     ------
     ValueError
-        A number of DOFs that is not that of the joint, or another order.
+        Another number or order of DOFs than the joint has; a weight that is not positive.
 
     Examples
     --------
@@ -97,8 +138,10 @@ class PlacedJoint:
     joint: LawJoint
     j: tuple[str, ...]
     k: tuple[str, ...] = ()
+    weight: float = 1.0
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "weight", as_positive("weight", self.weight))
         if isinstance(self.joint, Joint):
             object.__setattr__(self, "joint", LawJoint.of_joint(self.joint))
         check_type("joint", self.joint, LawJoint)
@@ -274,14 +317,46 @@ class Assembly:
             dict(parts), dict(joints), attachments, tuple(as_names("same", one) for one in same), dict(alike or {})
         )
         for name, one in found.joints.items():
-            for side, dofs in (("j", one.j), ("k", one.k)):
-                found.check(dofs, f"{side} of {name}:")
+            found.joints[name] = replace(one, joint=found._per_size(name, one))
         held = {dof.partition("/")[0] for own in found.ends for dof in own}
         for name in found.parts:
             if name not in held:
                 raise ValueError(f"no joint holds {name}")
         found._check_groups()
         return found
+
+    def _per_size(self, name: str, one: PlacedJoint) -> LawJoint:
+        """Return a joint with the units that its ends give it; raises an error where these do not fit together."""
+        units: dict[str, str] = {}
+        for place, dof in enumerate(one.joint.dofs):
+            regions = []
+            for side, end in (("j", one.j), ("k", one.k)):
+                if end and self.region(end[place]) is None:
+                    self.check(end[place : place + 1], f"{side} of {name}:")
+                regions += [self.region(end[place])] if end else []
+            first, *second = regions
+            if second and (first is None) != (second[0] is None):
+                raise ValueError(f"{name}: {dof} connects a region with a point; use a region on both sides")
+            if first is not None and not all(own is not None and first.matches(own) for own in second):
+                sizes = " and ".join(map(str, regions))
+                raise ValueError(f"{name}: {dof} connects {sizes}; give both regions the same size and degree")
+            if first is not None:
+                units[dof] = first.per
+        for a, b in one.joint.laws:
+            if len({self._ports_of(one.j[one.joint.dofs.index(dof)])[0].partition("~")[0] for dof in (a, b)}) > 1 and (
+                a in units or b in units
+            ):
+                raise ValueError(f"{name}: the cross term {a},{b} must be between DOFs of one region")
+        stated = {dof: unit for dof, unit in one.joint.per.items() if units.get(dof) != unit}
+        if stated:
+            dof, unit = next(iter(stated.items()))
+            raise ValueError(f"{name}: the values of {dof} are per {unit}, which its ends are not")
+        return one.joint.with_units_per(units) if units else one.joint
+
+    def region(self, name: str) -> Region | None:
+        """Return the region of which a DOF ``"plate/edge:z"`` is the motion; None of other DOFs."""
+        part, _, dof = name.partition("/")
+        return self.parts[part].region(dof) if part in self.parts else None
 
     def _set(self, parts: Any, joints: Any, attachments: Any, same: Any, alike: Any) -> None:
         if not isinstance(attachments, tuple | list):
@@ -348,6 +423,27 @@ class Assembly:
         """The DOFs of `joint` on either side; ``""`` on that of the ground."""
         j = tuple(dof for one in self.joints.values() for dof in one.j)
         return j, tuple(dof for one in self.joints.values() for dof in one.k or ("",) * len(one.j))
+
+    @cached_property
+    def ports(self) -> JointPorts:
+        """The ports of the joints: DOFs, and coefficients of the motion of regions."""
+        dofs, terms, weights, sides = list[int](), list[int](), list[float](), (list[str](), list[str]())
+        number = 0
+        for one in self.joints.values():
+            for place in range(len(one.j)):
+                ends = [self._ports_of(end[place]) if end else () for end in (one.j, one.k)]
+                count = len(ends[0])
+                dofs += [number] * count
+                terms += range(count)
+                weights += [one.weight] * count
+                for own, end in zip(sides, ends, strict=True):
+                    own.extend(end or [""] * count)
+                number += 1
+        return JointPorts(np.array(dofs), np.array(terms), np.array(weights), (tuple(sides[0]), tuple(sides[1])))
+
+    def _ports_of(self, name: str) -> tuple[str, ...]:
+        part, _, dof = name.partition("/")
+        return tuple(f"{part}/{own}" for own in self.parts[part].region_ports(dof)) or (name,)
 
     def with_joint(self, joint: LawJoint) -> Assembly:
         """Return the same assembly of two parts with another joint."""
@@ -453,7 +549,7 @@ def _is_open(own: str, meant: str) -> bool:
 
 def places_of(whole: Assembly, responses: Sequence[str], forces: Sequence[str]) -> Places:
     """Return the DOFs that matter: those of joints first, each once."""
-    named = [dof for own in whole.ends for dof in own if dof]
+    named = [dof for own in whole.ports.ends for dof in own if dof]
     named += [*responses, *forces, *(dof for one in whole.attachments for dof in one.places)]
     of_part: dict[str, list[str]] = {name: [] for name in whole.parts}
     for name in named:
@@ -483,12 +579,12 @@ def assembly_connection(
     Connection
         Pattern of shape (m, q).
     """
-    own = joint.connection(omega)
+    own = joint_connection(whole, joint, omega)
     q = own.pattern.shape[1]
     attached = [dof for one in whole.attachments for dof in one.places]
     total = q + len(attached)
     pattern = np.zeros((len(places.names), total))
-    ends = [*whole.ends[0], *whole.ends[1]]
+    ends = [*whole.ports.ends[0], *whole.ports.ends[1]]
     held = [i for i, dof in enumerate(ends) if dof]  # the ground does not move
     np.add.at(pattern[:, :q], places.at([ends[i] for i in held]), own.pattern[held])
     s, t = np.zeros((2, omega.size, total, total), np.complex128)
@@ -502,6 +598,36 @@ def assembly_connection(
             t[:, place, place] = attachment_factors(one, omega).T @ np.asarray(values)
             place += 1
     return Connection(pattern, s, t)
+
+
+def joint_connection(whole: Assembly, joint: LawJoint, omega: FloatArray) -> Connection:
+    """Return how the joints connect the ports of an assembly: pattern of shape (2 n_ports, q), j, then k."""
+    own, ports = joint.connection(omega), whole.ports
+    if ports.is_plain:
+        return own
+    column, term, dofs = *ports.columns(own.pattern), np.r_[ports.dof, len(joint.dofs) + ports.dof]
+    is_one = term[:, None] == term
+    of_port = own.pattern[dofs][:, column] * (np.tile(ports.term, 2)[:, None] == term)
+    of_port *= np.sqrt(np.tile(ports.weight, 2))[:, None]
+    s, t = (matrix[:, column[:, None], column] * is_one for matrix in (own.s, own.t))
+    return Connection(of_port, s, t)
+
+
+def connection_entries(
+    whole: Assembly, joint: LawJoint, omega: FloatArray
+) -> list[tuple[list[tuple[int, int]], ComplexArray]]:
+    """Return `LawJoint.connection_slopes` with the entries of T of `joint_connection`."""
+    found = joint.connection_slopes(omega)
+    if whole.ports.is_plain:
+        return found
+    column, term = whole.ports.columns(joint.connection(omega[:1]).pattern)
+    at: dict[int, list[int]] = {}
+    for i, own in enumerate(column.tolist()):
+        at.setdefault(own, []).append(i)
+    return [
+        ([(i, j) for row, other in entries for i in at[row] for j in at[other] if term[i] == term[j]], slope)
+        for entries, slope in found
+    ]
 
 
 def attachment_factors(one: Attachment, omega: FloatArray) -> ComplexArray:

@@ -1,22 +1,43 @@
-"""Errors of models, and how far joints that are alike scatter: as believed, or by the evidence of the FRFs."""
+"""Errors of models and gains, and how far joints that are alike scatter: by priors, or by the evidence of the FRFs."""
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import linalg
+from numpy.typing import ArrayLike, NDArray
 
-from jointfrf.identification.minimise import Linearised, Minimum, inverse_information, minimise
+from jointfrf.identification.minimise import Minimum, NormalEquations, inverse_information, minimise
 from jointfrf.identification.model.likelihood import Likelihood
 from jointfrf.identification.model.prediction import Prediction
-from jointfrf.identification.parameters import CommonMean, FitParameter, ParameterVector
+from jointfrf.identification.parameters import (
+    CommonMean,
+    ErrorOrigin,
+    FitParameter,
+    ParameterOrigin,
+    ParameterVector,
+)
 from jointfrf.kernel.arguments import FloatArray
 
-__all__ = ["ModelError", "spread_factors", "with_model_error", "with_spreads"]
+__all__ = [
+    "GAIN",
+    "ErrorGroup",
+    "ErrorLevel",
+    "Errors",
+    "error_terms",
+    "expected_covariance",
+    "spread_factors",
+    "with_discrepancy",
+    "with_errors",
+    "with_spreads",
+]
 
+#: Standard deviation of the prior of a gain that all FRFs share: accelerometers and hammers are calibrated to 1 to 2 %
+#: (ISO 16063-21).
+GAIN = 0.01
 #: Terms of a part at most, and numbers that their derivatives may take: 400 MB.
 _TERMS, _NUMBERS = 90, 25_000_000
 #: Where the search begins: models of one material and simple shape are as good.
@@ -26,10 +47,18 @@ _LARGEST = 0.3
 #: Levels that are compared, in steps of a factor of 1.12; at the last one, where errors beyond the band are ninefold,
 #: the parts are not what the models describe, or something else is wrong.
 _LEVELS = np.geomspace(1e-6, _LARGEST / 9, 93)
+#: Levels of gains that are compared.
+_GAINS = np.geomspace(1e-6, _LARGEST, 112)
+#: Cycles over the kinds of errors at most, and the change of the logarithm of a level that counts as none.
+_CYCLES, _SAME = 10, 0.05
 #: The level is found when it changes by less than this factor, or after so many fits.
 _SETTLED, _FITS = 1.15, 5
+#: Turns to the noise of models that are far off at most, and the factor between two turns that counts as none.
+_DISCREPANCY_TURNS, _DISCREPANCY_SETTLED = 15, 1.02
 #: -2 log evidence must be lower by this much than without errors: less is chance.
 _LEAST_GAIN = 1.0
+#: The same for gains: by chance one of 400 fits shows one, as by half of chi-squared of one degree.
+_LEAST_OF_GAINS = 7.9
 #: Levels whose -2 log evidence is higher by this are excluded: with 95 %, as by chi-squared of one degree.
 _EXCLUDED = 3.84
 #: What is believed of a spread relative to its mean: parts of one kind differ by some tens of percent at most.
@@ -40,120 +69,422 @@ _SPREADS = np.geomspace(1e-3, 3.0, 40)
 _SPREAD_STEPS, _SPREAD_SETTLED = 500, 1e-3
 
 
-class ModelError(NamedTuple):
-    """Errors of the models that no unknown describes, as the intervals allow for them.
+class ErrorLevel(NamedTuple):
+    """Standard deviation of errors of one kind, as the intervals allow for them.
 
     Attributes
     ----------
     level : float
-        Standard deviation of the relative errors of modal stiffnesses and masses that the FRFs show; 0 where they show
-        none.
+        Standard deviation of the relative errors that the FRFs show; 0 if they show none.
     gain : float
         -2 log evidence without errors minus that with this level.
     largest : float
-        The largest level that the FRFs do not exclude: what is believed of a part is allowed for up to this.
+        Largest level that the FRFs do not exclude: errors with a prior are allowed for up to this level.
     """
 
     level: float
     gain: float
     largest: float
 
-    def of_part(self, believed: float) -> float:
-        """Return the level of a part by what is believed of it (`Substructure.model_error`)."""
-        return max(self.level, min(self.largest, believed))
+    def of(self, believed: ArrayLike) -> FloatArray:
+        """Return the level of errors by the standard deviation of their prior."""
+        return np.maximum(self.level, np.minimum(self.largest, believed))
+
+
+class Errors(NamedTuple):
+    """Errors in addition to the unknowns of a fit.
+
+    Attributes
+    ----------
+    model : ErrorLevel
+        Errors of modal stiffnesses and masses of the parts (`Substructure.model_error`).
+    gains : dict of ErrorOrigin to ErrorLevel
+        Errors of the gains of responses, of forces, and of a gain that all FRFs share.
+    shapes : ErrorLevel
+        Errors of mode shapes of the parts at channels that no joint touches.
+    noise : float
+        Factor of the noise that covers what these errors leave (`with_discrepancy`).
+    """
+
+    model: ErrorLevel
+    gains: dict[ErrorOrigin, ErrorLevel]
+    shapes: ErrorLevel = ErrorLevel(0.0, 0.0, 0.0)
+    noise: float = 1.0
+
+    @property
+    def largest_level(self) -> float:
+        """Largest level that the FRFs show, of models or gains."""
+        return max([self.model.level, *(one.level for one in self.gains.values())])
+
+
+_NONE = ErrorLevel(0.0, 0.0, 0.0)
+
+
+class ErrorGroup(NamedTuple):
+    """Errors of one variance.
+
+    Attributes
+    ----------
+    origin : str
+    names : tuple of str
+    places : tuple of tuple
+        Place of each error, as in `FitParameter`.
+    weight, believed : ndarray, shape (n,)
+        Standard deviation of each error for a level of 1, and the level that its prior has.
+    levels : ndarray
+        Levels that are compared; the last one is no small error, and not allowed for.
+    least : float
+        -2 log evidence that a level must gain.
+    """
+
+    origin: ErrorOrigin
+    names: tuple[str, ...]
+    places: tuple[tuple[str | int, ...], ...]
+    weight: FloatArray
+    believed: FloatArray
+    levels: FloatArray
+    least: float
+
+    def parameters(self, deviation: FloatArray) -> Iterator[FitParameter]:
+        """Yield the errors as parameters with these standard deviations."""
+        limit = min(9 * float(self.levels[-1]), 0.9)
+        for name, place, std in zip(self.names, self.places, deviation.tolist(), strict=True):
+            yield FitParameter(name, "1", self.origin, place, 0.0, std, -limit, limit, False, True)
 
 
 @dataclass(frozen=True)
 class _Levels:
-    """-2 log evidence by the level, from squares about a point whose error terms have priors of some deviation."""
+    """Levels of all groups by the evidence, from squares about a point whose errors have priors.
 
-    at: Linearised
+    Attributes
+    ----------
+    at : NormalEquations
+        About x, with the priors of `deviation`.
+    x : ndarray, shape (p,)
+    groups : sequence of ErrorGroup
+        The last coordinates are their errors.
+    deviation : ndarray, shape (n_errors,)
+        Standard deviations of the priors, in whose units the coordinates are.
+    """
+
+    at: NormalEquations
     x: FloatArray
-    weight: FloatArray
+    groups: Sequence[ErrorGroup]
     deviation: FloatArray
 
-    def evidence(self, level: float) -> float:
-        """Return -2 log evidence but for a constant: squares minimised, and their volume over that of the priors."""
-        n = self.x.size - self.weight.size
-        z, ratio = self.x[n:], level * self.weight / self.deviation
-        information = self.at.information.copy()
-        information[range(n, self.x.size), range(n, self.x.size)] += 1 / ratio**2 - 1
-        gradient = self.at.gradient.copy()
-        gradient[n:] += z * (1 - 1 / ratio**2)
-        squares = self.at.cost + float((z**2 * (1 / ratio**2 - 1)).sum())
-        size = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
-        try:
-            factor = linalg.cholesky(information / np.outer(size, size), lower=True)
-        except linalg.LinAlgError:
-            return np.inf
-        step = linalg.solve_triangular(factor, gradient / size, lower=True)
-        volume = 2 * float(np.log(np.diagonal(factor)).sum() + np.log(size).sum() + np.log(ratio).sum())
-        return squares - float(step @ step) + volume
+    def found(self, begin: Sequence[float]) -> list[ErrorLevel]:
+        """Return the level of each group that maximises the evidence, one after the other until they settle."""
+        n, count = self.x.size - self.deviation.size, [one.weight.size for one in self.groups]
+        ends = n + np.cumsum([0, *count])
+        weight = np.concatenate([one.weight for one in self.groups])
+        # Without the priors of the errors, in units of the deviation for a level of 1, and about no errors.
+        unit = np.concatenate([np.ones(n), weight / self.deviation])
+        of_errors = np.zeros(self.x.size)
+        of_errors[n:] = 1.0
+        information = self.at.information - np.diag(of_errors)
+        gradient = self.at.gradient + of_errors * self.x
+        gradient = (gradient + information[:, n:] @ self.x[n:]) * unit
+        information = information * np.outer(unit, unit)
+        levels, best = list(begin), [_NONE] * len(self.groups)
+        for _ in range(_CYCLES):
+            before = list(levels)
+            for i, group in enumerate(self.groups):
+                own = slice(ends[i], ends[i + 1])
+                prior = np.concatenate([np.zeros(n), np.repeat([max(one, _LEVELS[0]) ** -2 for one in levels], count)])
+                best[i] = _level_of(information, gradient, prior, own, group)
+                levels[i] = best[i].level
+            if abs(np.log(np.maximum(levels, _LEVELS[0]) / np.maximum(before, _LEVELS[0]))).max() < _SAME:
+                break
+        return best
 
-    def error(self) -> ModelError:
-        """Return what the FRFs show, and do not exclude."""
-        costs = np.array([self.evidence(float(one)) for one in _LEVELS])
-        best = int(np.argmin(costs))
-        gain, largest = float(costs[0] - costs[best]), _LEVELS[np.flatnonzero(costs <= costs[best] + _EXCLUDED)[-1]]
-        return ModelError(float(_LEVELS[best]) if gain > _LEAST_GAIN else 0.0, gain, float(largest))
+
+def _level_of(
+    information: FloatArray, gradient: FloatArray, prior: FloatArray, own: slice, group: ErrorGroup
+) -> ErrorLevel:
+    """Return the level of a group, whose coordinates are `own`, by the information of all priors, shape (p,)."""
+    rest = np.r_[0 : own.start, own.stop : len(gradient)]
+    inner = information[np.ix_(rest, rest)] + np.diag(prior[rest])
+    cross = information[own, rest]
+    back = cross @ inverse_information(inner)
+    apart = information[own, own] - back @ cross.T
+    value, vector = np.linalg.eigh((apart + apart.T) / 2)
+    along = (vector.T @ (gradient[own] - back @ gradient[rest])) ** 2
+    levels = group.levels
+    squared = levels[:, None] ** 2
+    scaled = 1 + squared * np.maximum(value, 0)
+    costs = (np.log(scaled) - squared * along / scaled).sum(axis=1)
+    best = int(np.argmin(costs))
+    gain = float(costs[0] - costs[best])
+    largest = float(levels[np.flatnonzero(costs <= costs[best] + _EXCLUDED)[-1]])
+    return ErrorLevel(float(levels[best]) if gain > group.least else 0.0, gain, largest)
 
 
-def with_model_error(
-    likelihood: Likelihood, minimum: Minimum, *, is_sought: bool = True, at_most: float = np.inf
-) -> tuple[Likelihood, Minimum, ModelError] | None:
-    """Fit with errors of the models as the FRFs show them, and as are believed; None where there are none.
+def with_errors(
+    likelihood: Likelihood,
+    minimum: Minimum,
+    common_gain: float,
+    *,
+    is_sought: bool = True,
+    at_most: float = np.inf,
+) -> tuple[Likelihood, Minimum, Errors] | None:
+    """Fit with errors of models and gains as the FRFs show them, and as their priors allow; None if there are none.
 
     Parameters
     ----------
     likelihood : Likelihood
     minimum : Minimum
-        Without errors of the models.
+        Without these errors.
+    common_gain : float
+        Standard deviation of the prior of a gain that all FRFs share.
     is_sought : bool
-        Whether errors that the FRFs show are allowed for where they are not believed.
+        Whether errors of models that the FRFs show are allowed for if they have no prior.
     at_most : float
-        Level above which no fit is made: None where the squares about the minimum show a larger one.
+        Level above which no fit is made: None if the squares about the minimum show a larger one.
 
     Notes
     -----
-    The level maximises the evidence, the likelihood integrated over all parameters and errors, by Laplace's method at
-    the minimum, which moves with it [1]_. What joint and unknowns can mimic leaves no trace in it: so a part has at
-    least the level that is believed of it, as far as the evidence does not exclude it. A level that is absurdly high is
-    no error of the models, and not allowed for.
+    Errors of one kind have one variance. It maximises the evidence, the likelihood integrated over all parameters and
+    errors, by Laplace's method at the minimum, which moves with it [1]_. The evidence shows no error that joint and
+    unknowns can mimic: a part has at least the level of its prior, as far as the evidence does not exclude it, and so
+    has the gain that all FRFs share. The largest level that is compared is no small error, and not allowed for.
 
     References
     ----------
     .. [1] D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415-447.
     """
-    prediction, n = likelihood.prediction, minimum.x.size
-    is_believed = any(side.part.error_level > 0 for side in prediction.sides)
-    if not (is_sought or is_believed):
+    n = minimum.x.size
+    shape = likelihood.measured.shape[1], likelihood.measured.shape[2]
+    groups = [
+        *_gain_groups(likelihood.vector, shape, common_gain),
+        *_model_groups(likelihood.prediction, likelihood.measured.size, is_sought=is_sought),
+    ]
+    if not groups:
         return None
-    most = min(_TERMS, int(_NUMBERS / max(likelihood.measured.size, 1)) // len(prediction.sides))
-    for side in prediction.sides:
-        side.allow_errors(most)
-    weight = _deviations(prediction, ModelError(1.0, 0.0, 0.0))
-    deviation, x = _FIRST * weight, np.concatenate([minimum.x, np.zeros(weight.size)])
-    error = ModelError(0.0, 0.0, 0.0)
+    deviation = np.concatenate([_FIRST * one.weight for one in groups])
+    x = np.concatenate([minimum.x, np.zeros(deviation.size)])
+    levels = [_NONE] * len(groups)
     for turn in range(_FITS):
-        own = replace(likelihood, vector=_with_errors(likelihood.vector, prediction, deviation))
+        own = replace(likelihood, vector=_with_parameters(likelihood.vector, groups, deviation))
         if turn:
             at = minimise(own, x, least=1e-2, small=1e-1)
-            x, about = at.x, Linearised(at.cost, at.information, at.gradient)
+            x, about = at.x, NormalEquations(at.cost, at.information, at.gradient)
         else:
             about = own.linearised(x)
-        error = _Levels(about, x, weight, deviation).error()
-        if not is_sought or (turn and error.level == _LEVELS[-1]):
-            error = error._replace(level=0.0)
-        found = _deviations(prediction, error)
-        if not found.any() or (turn == 0 and error.level > at_most):
+        levels = _Levels(about, x, groups, deviation).found([one.level for one in levels])
+        levels = _as_allowed(groups, levels, is_sought=is_sought, is_first=not turn)
+        found = [level.of(one.believed) * one.weight for one, level in zip(groups, levels, strict=True)]
+        if not any(one.any() for one in found) or (turn == 0 and max(one.level for one in levels) > at_most):
             return None
-        ratio = np.maximum(found, _LEVELS[0] * weight) / deviation
+        least = [_LEVELS[0] * one.weight for one in groups]
+        ratio = np.maximum(np.concatenate(found), np.concatenate(least)) / deviation
         x[n:] /= ratio
         deviation = deviation * ratio
-        if turn and max(ratio.max(), 1 / ratio.min()) < _SETTLED:
+        if turn == 0 and not all(one.any() for one in found):
+            kept = np.concatenate([np.full(one.size, one.any()) for one in found])
+            x, deviation = np.concatenate([x[:n], x[n:][kept]]), deviation[kept]
+            groups = list(itertools.compress(groups, [one.any() for one in found]))
+            levels = list(itertools.compress(levels, [one.any() for one in found]))
+        elif turn and max(ratio.max(), 1 / ratio.min()) < _SETTLED:
             break
-    own = replace(likelihood, vector=_with_errors(likelihood.vector, prediction, deviation))
-    return own, minimise(own, x), error
+    own = replace(likelihood, vector=_with_parameters(likelihood.vector, groups, deviation))
+    by_origin = {one.origin: level for one, level in zip(groups, levels, strict=True)}
+    return own, minimise(own, x), Errors(by_origin.pop("error", _NONE), by_origin)
+
+
+def with_discrepancy(
+    likelihood: Likelihood, minimum: Minimum, inflation: float, ratio: float
+) -> tuple[Likelihood, Minimum, Errors] | None:
+    """Fit models that are far off: with errors of modal matrices and mode shapes, and noise that covers the rest.
+
+    None if such a fit does not converge.
+
+    Parameters
+    ----------
+    likelihood : Likelihood
+    minimum : Minimum
+        Without these errors.
+    inflation : float
+        Lines that carry the noise of one independent line.
+    ratio : float
+        Residual over noise at this minimum, where the noise begins.
+
+    Notes
+    -----
+    The mixed model y = f(x) + B u + e with a variance of its own for each kind of errors u, and one factor of the
+    variance of e. The factor falls from turn to turn to the mean square of the residual that the errors leave: FRFs
+    with much noise have one broad minimum, which the turns follow down.
+    """
+    vector, n = likelihood.vector, minimum.x.size
+    groups = _model_groups(likelihood.prediction, likelihood.measured.size, is_sought=True, of_shapes=True)
+    levels = [np.maximum(one.believed, _FIRST) for one in groups]
+    starts = minimum.x, vector.to_coordinates(vector.values)
+    x = np.concatenate([starts[0], np.zeros(sum(one.weight.size for one in groups))])
+    scale, count = ratio, 2.0 * float(likelihood.used.sum())
+    found, before = [_NONE] * len(groups), np.inf
+    for turn in range(_DISCREPANCY_TURNS):
+        deviation = np.concatenate([level * one.weight for one, level in zip(groups, levels, strict=True)])
+        own = replace(likelihood.with_noise(scale), vector=_with_parameters(vector, groups, deviation))
+        if turn == 0:
+            x[:n] = min(starts, key=likelihood.with_noise(scale).cost)
+        at = minimise(own, x)
+        if not at.converged:
+            return None
+        of_priors = np.diagonal(own.vector.prior_information(at.x))[n:]
+        held = float(of_priors @ np.diagonal(inverse_information(at.information))[n:])
+        squares = at.cost - float((own.vector.pulls(at.x) ** 2).sum())
+        left = float(np.sqrt(squares * inflation / max(count - (at.x.size - held), 1.0)))
+        about = NormalEquations(at.cost, at.information, at.gradient)
+        found = _Levels(about, at.x, groups, deviation).found([float(np.mean(one)) for one in levels])
+        x, before, scale = at.x, scale, max(scale * left, 1.0)
+        if before / scale < _DISCREPANCY_SETTLED:
+            break
+        others = [np.clip(one.level, np.maximum(group.believed, _FIRST), group.levels[-1])
+                  for one, group in zip(found, groups, strict=True)]  # fmt: skip
+        x[n:] *= np.concatenate([one / other for one, other in zip(levels, others, strict=True)])
+        levels = others
+    by_origin = {one.origin: own._replace(level=float(level.max()))
+                 for one, own, level in zip(groups, found, levels, strict=True)}  # fmt: skip
+    return own, at, Errors(by_origin.get("error", _NONE), {}, by_origin.get("shape-error", _NONE), before)
+
+
+def _as_allowed(
+    groups: Sequence[ErrorGroup], levels: Sequence[ErrorLevel], *, is_sought: bool, is_first: bool
+) -> list[ErrorLevel]:
+    """Return levels without those that are not sought, or so large that the models do not describe the parts."""
+    is_absurd = [one.level == group.levels[-1] for one, group in zip(levels, groups, strict=True)]
+    if not is_first and any(at and one.origin == "error" for at, one in zip(is_absurd, groups, strict=True)):
+        return [one._replace(level=0.0) for one in levels]  # nor are gains seen with such models
+    dropped = [
+        not is_sought if one.origin == "error" else absurd for absurd, one in zip(is_absurd, groups, strict=True)
+    ]
+    return [one._replace(level=0.0) if drop else one for drop, one in zip(dropped, levels, strict=True)]
+
+
+def _model_groups(prediction: Prediction, size: int, *, is_sought: bool, of_shapes: bool = False) -> list[ErrorGroup]:
+    """Return the errors of the models of all parts, if any is sought or has a prior; those of mode shapes last."""
+    sides = prediction.sides
+    if not (is_sought or any(side.part.error_level > 0 for side in sides)):
+        return []
+    most = min(_TERMS, int(_NUMBERS / max(size, 1)) // len(sides))
+    for side in sides:
+        side.allow_errors(most, prediction.away_from_joints(side.name) if of_shapes else ())
+    known = [(side, side.errors) for side in sides if side.errors is not None]
+    of_matrices = [(side, i, one) for side, errors in known for i, one in enumerate(errors.terms)]
+    at_points = [(side, i, one) for side, errors in known for i, one in enumerate(errors.shape_terms)]
+    kinds: tuple[tuple[ErrorOrigin, list[Any], float, FloatArray, float], ...] = (
+        ("error", of_matrices, 1.0, _LEVELS, _LEAST_GAIN),
+        ("shape-error", at_points, 0.0, _GAINS, _LEAST_OF_GAINS),  # their priors are not stated
+    )
+    return [
+        ErrorGroup(
+            origin,
+            tuple(f"{side.name}/{one.matrix} {one.row + 1} {one.column + 1}" for side, _, one in terms),
+            tuple((side.name, i) for side, i, _ in terms),
+            np.array([one.weight for *_, one in terms]),
+            np.array([stated * side.part.error_level for side, *_ in terms]),
+            levels,
+            least,
+        )
+        for origin, terms, stated, levels, least in kinds
+        if terms
+    ]
+
+
+def _gain_groups(vector: ParameterVector, shape: tuple[int, int], common_gain: float) -> list[ErrorGroup]:
+    """Return the gains of responses, of forces, and of all FRFs, as far as the fit does not have them as unknowns."""
+    origins: tuple[tuple[ErrorOrigin, ParameterOrigin], ...] = (
+        ("response-error", "response"), ("force-error", "force")
+    )  # fmt: skip
+    found, is_unknown = [], False
+    for (origin, unknown), number in zip(origins, shape, strict=True):
+        known = {int(vector.all[i].place[0]) for i in vector.places_of(unknown)}
+        left = tuple((i,) for i in range(number) if i not in known)
+        is_unknown |= not left
+        if number > 1 and left:
+            one, names = np.ones(len(left)), tuple(f"gain of {unknown} {i + 1}" for (i,) in left)
+            found.append(ErrorGroup(origin, names, left, one, 0 * one, _GAINS, _LEAST_OF_GAINS))
+    if not is_unknown:
+        own = np.ones(1), np.full(1, common_gain)
+        found.insert(0, ErrorGroup("common-error", ("gain of all FRFs",), ((0,),), *own, _GAINS, _LEAST_OF_GAINS))
+    return found
+
+
+def error_terms(
+    prediction: Prediction, vector: ParameterVector, shape: tuple[int, int], common_gain: float
+) -> tuple[ParameterVector, list[ErrorGroup]]:
+    """Return a vector to which all errors with a prior are added, at a level of 1, and these errors.
+
+    Parameters
+    ----------
+    prediction : Prediction
+    vector : ParameterVector
+        Without them.
+    shape : (int, int)
+        Numbers of responses and forces.
+    common_gain : float
+        Standard deviation of the prior of a gain that all FRFs share.
+    """
+    size = prediction.omega.size * shape[0] * shape[1]
+    gains = [one for one in _gain_groups(vector, shape, common_gain) if one.believed.any()]
+    groups = [*gains, *_model_groups(prediction, size, is_sought=False)]
+    return _with_parameters(vector, groups, np.concatenate([np.zeros(0), *(one.weight for one in groups)])), groups
+
+
+def expected_covariance(of_frfs: FloatArray, prior: FloatArray, groups: Sequence[ErrorGroup]) -> FloatArray:
+    """Return the covariance of the parameters that a fit of FRFs of perfect models will state.
+
+    Parameters
+    ----------
+    of_frfs : ndarray, shape (p + e, p + e)
+        Information of the FRFs on parameters and errors, these in units of their deviations at a level of 1.
+    prior : ndarray, shape (p, p)
+        Information of the priors of the parameters.
+    groups : sequence of ErrorGroup
+        All errors in their order.
+
+    Returns
+    -------
+    ndarray, shape (p, p)
+
+    Notes
+    -----
+    A fit allows for errors up to the level of their prior as far as the evidence does not exclude it (`with_errors`).
+    The expectation of -2 log evidence over the noise is log det I - tr(I^-1 J) + 2 e log(level), with the information
+    J of the FRFs and I = J + P of FRFs and priors.
+    """
+    p = len(prior)
+    ends = p + np.cumsum([0, *(one.weight.size for one in groups)])
+    whole = of_frfs.copy()
+    whole[:p, :p] += prior
+    levels = [np.clip(one.believed, one.levels[0], one.levels[-1]) for one in groups]
+    for i, one in enumerate(groups):
+        others = np.concatenate([np.zeros(0), *(level**-2.0 for j, level in enumerate(levels) if j != i)])
+        own = np.arange(ends[i], ends[i + 1])
+        rest = np.delete(np.arange(len(whole)), own)
+        priors = np.zeros((rest.size, rest.size))
+        priors[:p, :p] = prior
+        priors[range(p, rest.size), range(p, rest.size)] = others
+        largest = _expected_level(of_frfs, priors, rest, own, one.levels)
+        levels[i] = np.clip(one.believed, one.levels[0], max(largest, float(one.levels[0])))
+    errors = np.arange(p, len(whole))
+    whole[errors, errors] += np.concatenate([np.zeros(0), *(level**-2.0 for level in levels)])
+    return np.asarray(np.linalg.inv(whole)[:p, :p], np.float64)
+
+
+def _expected_level(
+    of_frfs: FloatArray, prior: FloatArray, rest: NDArray[np.intp], own: NDArray[np.intp], levels: FloatArray
+) -> float:
+    """Return the largest level of the errors `own` that the mean evidence does not exclude; `prior` is of the rest."""
+    a = np.linalg.inv(of_frfs[np.ix_(rest, rest)] + prior)
+    onto = a @ of_frfs[np.ix_(rest, own)]
+    value, turned = np.linalg.eigh(of_frfs[np.ix_(own, own)] - of_frfs[np.ix_(own, rest)] @ onto)
+    value = np.maximum(value, 0.0)
+    through = onto @ turned
+    held = np.einsum("ik,ij,jk->k", through, prior, through)
+    squared = levels[:, None] ** 2
+    ratio = value * squared
+    costs = (np.log1p(ratio) + 1 / (1 + ratio) * (1 + held * squared)).sum(axis=1)
+    return float(levels[np.flatnonzero(costs <= costs.min() + _EXCLUDED)[-1]])
 
 
 def with_spreads(likelihood: Likelihood, minimum: Minimum) -> tuple[Likelihood, Minimum]:
@@ -289,22 +620,8 @@ def _most_likely(squares: float, count: int, size: float) -> float:
     return float(brentq(lambda s: (count - 1) * s**2 + s**3 / usual - squares, 0.0, largest, rtol=1e-9))
 
 
-def _deviations(prediction: Prediction, error: ModelError) -> FloatArray:
-    """Return the standard deviations of the error terms of all parts."""
-    found = [
-        error.of_part(side.part.error_level) * np.array([term.weight for term in side.errors.terms])
-        for side in prediction.sides
-        if side.errors is not None
-    ]
-    return np.concatenate([np.zeros(0), *found])
-
-
-def _with_errors(vector: ParameterVector, prediction: Prediction, deviation: FloatArray) -> ParameterVector:
-    """Return a vector to which the error terms of all parts are added."""
-    found, left = list(vector.all), iter(deviation.tolist())
-    for side in prediction.sides:
-        for i, term in enumerate(side.errors.terms if side.errors is not None else ()):
-            name = f"{side.name}/{term.matrix} {term.row + 1} {term.column + 1}"
-            place = (side.name, i)
-            found.append(FitParameter(name, "1", "error", place, 0.0, next(left), -_LARGEST, _LARGEST, False, True))
-    return ParameterVector(tuple(found), vector.means)
+def _with_parameters(vector: ParameterVector, groups: Sequence[ErrorGroup], deviation: FloatArray) -> ParameterVector:
+    """Return a vector to which the errors of all groups are added."""
+    ends = np.cumsum([one.weight.size for one in groups])[:-1]
+    added = [one.parameters(own) for one, own in zip(groups, np.split(deviation, ends), strict=True)]
+    return ParameterVector((*vector.all, *itertools.chain(*added)), vector.means)

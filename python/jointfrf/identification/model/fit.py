@@ -14,29 +14,40 @@ from scipy import special
 from scipy.sparse import csgraph
 
 from jointfrf.errors import IllConditionedWarning
-from jointfrf.frf.noise_model import NoiseModel
+from jointfrf.frf.noise_model import NoiseModel, acceleration_floor, describes_better
 from jointfrf.frf.noise_parts import line_correlation
 from jointfrf.frf.smoothing import pieces
-from jointfrf.identification.calibration import CalibrationSpread, student_factor
+from jointfrf.frf.stated_noise import StatedNoise
 from jointfrf.identification.line_starts import LineCompliance, from_lines, interface_compliance
 from jointfrf.identification.minimise import Minimum, inverse_information, minimise
-from jointfrf.identification.model.evidence import ModelError, spread_factors, with_model_error, with_spreads
+from jointfrf.identification.mixed import Added, added_by, mass_effects, parameter_ratio, smooth_effects, student_factor
+from jointfrf.identification.model.evidence import (
+    GAIN,
+    Errors,
+    spread_factors,
+    with_discrepancy,
+    with_errors,
+    with_spreads,
+)
 from jointfrf.identification.model.likelihood import Likelihood
 from jointfrf.identification.model.prediction import Prediction
 from jointfrf.identification.model.starts import ranked_trials, refined
-from jointfrf.identification.model.uncertainty import ModelGradient
+from jointfrf.identification.model.uncertainty import BandHomogeneity, ModelLinearised, band_homogeneity
 from jointfrf.identification.noise import KnownNoise, noise_about
 from jointfrf.identification.parameters import ParameterVector
 from jointfrf.identification.profile import Intervals, ProfileIntervals
 from jointfrf.identification.residual_test import ResidualTest, check_residual
-from jointfrf.identification.scatter import Spread
+from jointfrf.identification.scatter import Spread, spread_of
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.parallel.pool import one_thread
 
 __all__ = [
     "FoundModel",
+    "GainError",
     "ModelProblem",
     "OpenDirection",
     "Unseparated",
+    "common_gain",
     "fit_assembly",
     "lowest_minimum",
     "open_directions",
@@ -60,6 +71,12 @@ _REFINED = 3
 _BLIND = 1e9
 #: The parameters of a fit have not taken up more of the noise than this.
 _MOST_TAKEN = 0.9
+#: A gain is named that differs from 1 by so many standard deviations: by chance one of 400 does.
+_NAMED_GAIN = 3.0
+#: Errors that are gains.
+_GAIN_ERRORS = ("response-error", "force-error", "common-error")
+#: Share of a standard error that is noticeable.
+_TENTH = 0.1
 #: -2 log likelihood of two points that differ by less is the same.
 _SAME = 1e-3
 
@@ -120,6 +137,25 @@ class ModelProblem:
         return replace(self, shared=self.prediction.part_noise(self.vector, self.vector.to_values(minimum.x)))
 
 
+class GainError(NamedTuple):
+    """Gain of a channel, or of all FRFs, that the FRFs contradict.
+
+    Attributes
+    ----------
+    origin : str
+        "response-error", "force-error" or "common-error".
+    channel : int
+        Number of the response or force.
+    value, std : float
+        Measured over true, and its standard deviation.
+    """
+
+    origin: str
+    channel: int
+    value: float
+    std: float
+
+
 class FoundModel(NamedTuple):
     """Result of `fit_assembly`.
 
@@ -140,16 +176,22 @@ class FoundModel(NamedTuple):
     directions : tuple of OpenDirection
     other : float
         Squares by which the next lowest minimum of another start is higher; inf where none was followed.
-    error : ModelError or None
-        Errors of the models beside their unknowns, where the FRFs show any.
+    error : Errors or None
+        Errors of models and gains beside the unknowns, if the FRFs show any or priors allow for them.
+    gains : tuple of GainError
+        Gains among these errors that differ from 1.
     test_with_error : ResidualTest
         Of the residual, with these; `test` is that without them.
     spread : Spread
         Variance factors by what FRFs share.
-    calibration : CalibrationSpread or None
+    added : Added
         What smooth errors of channels add to the coordinates.
     unseparated : tuple of Unseparated
         Parameters of several joints that the FRFs do not tell apart.
+    parts : BandHomogeneity
+        The coordinates by part of the band.
+    error_matters : bool
+        Whether these errors change the joint or its intervals noticeably.
     """
 
     problem: ModelProblem
@@ -162,16 +204,29 @@ class FoundModel(NamedTuple):
     test: ResidualTest
     directions: tuple[OpenDirection, ...]
     other: float
-    error: ModelError | None
+    error: Errors | None
+    gains: tuple[GainError, ...]
     test_with_error: ResidualTest
     spread: Spread
-    calibration: CalibrationSpread | None
+    added: Added
     unseparated: tuple[Unseparated, ...]
+    parts: BandHomogeneity
+    error_matters: bool = False
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether the fit came to no minimum because the models do not fit the FRFs: no interval follows from it."""
+        return not self.minimum.converged and self.test_with_error.is_large
 
 
 def fit_assembly(problem: ModelProblem) -> FoundModel:
     """Fit all free parameters by maximum likelihood."""
-    with warnings.catch_warnings(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+    # On matrices as small as reduced models, threads of a BLAS wait for each other most of the time.
+    with (
+        one_thread(of_blas_only=True),
+        warnings.catch_warnings(),
+        np.errstate(over="ignore", divide="ignore", invalid="ignore"),
+    ):
         warnings.simplefilter("ignore", IllConditionedWarning)
         minimum, other = lowest_minimum(problem)
         if problem.prediction.has_noisy_parts:
@@ -245,8 +300,10 @@ def _values_of_equal(problem: ModelProblem) -> Iterator[FloatArray]:
 
 def _is_explained(problem: ModelProblem, minimum: Minimum) -> bool:
     """Whether small errors of the models explain what the residual has beside the noise: no other start is needed."""
-    found = with_model_error(problem.likelihood, minimum, at_most=_SMALL_ERROR)
-    return found is not None and found[2].level < _SMALL_ERROR and _ratio(*found[:2], problem.noise.inflation) < _GOOD
+    found = with_errors(problem.likelihood, minimum, common_gain(problem), at_most=_SMALL_ERROR)
+    if found is None or found[2].largest_level >= _SMALL_ERROR:
+        return False
+    return _ratio(*found[:2], problem.noise.inflation) < _GOOD
 
 
 def _values_of_lines(problem: ModelProblem) -> Iterator[FloatArray]:
@@ -281,13 +338,16 @@ def _with_noise_of_model(problem: ModelProblem, minimum: Minimum) -> ModelProble
     ratio = _ratio(likelihood, minimum, problem.noise.inflation)
     if problem.noise.is_assumed:
         return None if abs(ratio - 1) < 1e-3 else replace(problem, variance=problem.variance * ratio**2)
+    if problem.noise.stated is not None:
+        return _with_stated_noise(problem, problem.noise.stated, minimum) if ratio <= _GOOD else None
     noise = problem.noise.model
     # About fitted FRFs there is the noise of the substructures, too.
     is_apart = problem.shared is None and noise is not None and noise.source == "residual" and ratio <= _GOOD
     if noise is None or not is_apart or noise.coherence_factor.any():
         return None
     predicted = problem.prediction.frfs(problem.vector, problem.vector.to_values(minimum.x))
-    parts = [noise.relative**2 * abs(h) ** 2 + noise.floor**2 for h in (predicted, problem.smooth)]
+    shape = noise.floor_shape(problem.freq_hz)[:, None, None]
+    parts = [noise.relative**2 * abs(h) ** 2 + noise.floor**2 * shape for h in (predicted, problem.smooth)]
     usable = np.isfinite(problem.variance) & (parts[0] > 0) & (parts[1] > 0)
     share = np.where(usable, parts[0] / np.where(usable, parts[1], 1), 1)
     tested = problem.variance * share
@@ -304,18 +364,34 @@ def _with_noise_of_model(problem: ModelProblem, minimum: Minimum) -> ModelProble
     return replace(found, noise=replace(problem.noise, inflation=inflation))
 
 
+def _with_stated_noise(problem: ModelProblem, stated: StatedNoise, minimum: Minimum) -> ModelProblem:
+    """Return the problem with noise relative to the fitted FRFs: measured ones favour lines that noise made small."""
+    predicted = problem.prediction.frfs(problem.vector, problem.vector.to_values(minimum.x))
+    variance = stated.variance(problem.freq_hz, predicted)
+    usable = np.isfinite(problem.variance) & (variance > 0)
+    return replace(problem, variance=np.where(usable, variance, problem.variance), smooth=predicted)
+
+
 def _about(problem: ModelProblem, noise: NoiseModel, predicted: ComplexArray) -> FloatArray:
     """Return E|e|^2 by what measured FRFs differ from fitted ones, relative part and floor by entry.
 
     Smooth FRFs are off at antiresonances, which looks like a floor and hides what small FRFs say.
     """
     used = np.isfinite(problem.variance).all(axis=0)
-    usual, outlying = noise.line_level, noise.line_factor
-    squares = np.asarray(abs((problem.measured - predicted)[:, used].T) ** 2 / usual, float)
+    outlying = noise.line_factor
+    squares = np.asarray(abs((problem.measured - predicted)[:, used].T) ** 2, float)
     size, good = np.asarray(abs(predicted[:, used].T) ** 2, float), outlying == 1
-    relative, floor = noise_about(squares[:, good], size[:, good])
-    variance = np.full(predicted.shape, np.inf)
-    variance[:, used] = ((relative[:, None] * size + floor[:, None]) * usual * outlying).T
+    # A floor of acceleration may describe the slow variation that was found without models.
+    choices: list[tuple[FloatArray, FloatArray]] = [(noise.line_level, noise.floor_shape(problem.freq_hz))]
+    if noise.inflation_source != "none":  # noise that is to stay as it was found
+        choices.append((np.ones(good.size), acceleration_floor(problem.freq_hz)))
+    least, variance = np.inf, np.full(predicted.shape, np.inf)
+    for usual, shape in choices:
+        relative, floor, loss = noise_about((squares / usual)[:, good], size[:, good], shape[good])
+        loss += 2 * len(squares) * float(np.log(usual[good]).sum())
+        if least == np.inf or describes_better(loss, least):
+            least = loss
+            variance[:, used] = ((relative[:, None] * size + floor[:, None] * shape) * usual * outlying).T
     return variance
 
 
@@ -326,11 +402,17 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
     test = with_error = _test(problem, likelihood, minimum, residual, predicted)
     # Of a residual that errors of channels explain, none is one of the models.
     explained = problem.noise.calibration is not None and test.is_noise
-    found = with_model_error(likelihood, minimum, is_sought=not explained)
+    without, found = minimum, with_errors(likelihood, minimum, common_gain(problem), is_sought=not explained)
+    is_rejected = found is None or not found[1].converged  # errors of these kinds do not describe what is wrong
+    if is_rejected and without.converged:
+        found = None
+    if is_rejected and test.is_large and not explained:
+        found = with_discrepancy(likelihood, without, problem.noise.inflation, test.ratio)
+        minimum = without._replace(converged=False)  # without errors the fit is of models that do not fit
     if found is not None:
         likelihood, minimum = found[:2]
         residual, predicted = _residual(problem, likelihood, minimum)
-        with_error = _test(problem, likelihood, minimum, residual, predicted)
+        with_error = _test(problem, likelihood, minimum, residual / found[2].noise, predicted)
     vector, n = likelihood.vector, likelihood.vector.n_shown
     # Of logarithms of the joint none: far away they may well be seen.
     least = (_BLIND * np.maximum(1.0, 1 / vector.scale)) ** -2
@@ -342,19 +424,22 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
         blind &= bool(likelihood.cost(believed) < minimum.cost + _SAME)
         minimum = minimum._replace(x=np.where(blind, believed, minimum.x))
     values = vector.to_values(minimum.x)
-    gradient = ModelGradient.of(likelihood, minimum, problem.noise.inflation)
-    own, slope, errors = gradient.covariance, vector.slope(minimum.x)[:n], problem.noise.calibration
-    calibration = None if errors is None else gradient.calibration(errors, problem.freq_hz)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        beside = 0.0 if calibration is None else np.nan_to_num(np.diagonal(calibration.covariance) / np.diagonal(own))
+    matters = found is not None and _matters(vector, without, minimum)
+    at = ModelLinearised.of(likelihood, minimum, problem.noise.inflation)
+    every_line = np.ones((1, problem.freq_hz.size))
+    shape = problem.measured.shape[1], problem.measured.shape[2]
+    effects = smooth_effects(at, problem.noise.calibration, problem.freq_hz, shape, every_line)
+    effects += mass_effects(at, problem.noise.mass, problem.freq_hz, problem.measured, every_line)
+    added = added_by(effects, at)
+    beside = parameter_ratio(added.covariance, at)
     by_noise = max(1.0, with_error.ratio**2) if with_error.is_large else 1.0
-    spread = gradient.spread(by_noise, beside, problem.motion)
-    root, factor = np.sqrt(spread.factor), spread.factor
-    covariance = own * np.outer(root, root)
-    if calibration is not None:
-        covariance += calibration.covariance
-        found_part = np.asarray(beside) * calibration.found
-        factor = (factor + beside) * student_factor(factor + beside - found_part, found_part, calibration.degrees)
+    spread = spread_of(at, by_noise, problem.noise.inflation, beside, problem.motion)
+    parts = band_homogeneity(at, problem.freq_hz, spread.factor + beside)
+    spread = spread._replace(factor=spread.factor * parts.factor)
+    root, slope = np.sqrt(spread.factor), np.diagonal(at.slope)
+    covariance = at.covariance * np.outer(root, root) + added.covariance
+    factor, estimated = spread.factor + beside, beside * added.estimated
+    factor = factor * student_factor(factor - estimated, estimated, added.degrees)
     if vector.means:
         wider = spread_factors(vector, minimum)[:n]
         covariance, factor = covariance * np.sqrt(np.outer(wider, wider)), factor * wider
@@ -363,15 +448,45 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
     unknown = np.flatnonzero(blind)
     whole[unknown, unknown] = covariance[unknown, unknown] = np.inf
     of_spread = spread_factors(vector, minimum)[:n] > _OF_SPREAD if vector.means else np.zeros(n, bool)
-    profiles = _Profiles(likelihood, vector, minimum, whole, factor, of_spread)
+    has_failed = not minimum.converged and with_error.is_large
+    profiles = _Profiles(likelihood, vector, minimum, whole, factor, of_spread, has_failed)
     intervals = Intervals([one.name for one in vector.fitted[:n]], profiles.of, profiles.of_function)
     of_shown = problem.vector, minimum.x[:n], minimum.information[:n, :n]
     directions = open_directions(*of_shown)
     return FoundModel(
         problem, minimum, values, covariance, intervals, predicted, residual, test,
-        directions, other, None if found is None else found[2], with_error, spread, calibration,
-        unseparated(*of_shown, directions),
+        directions, other, None if found is None else found[2], _gains(vector, minimum), with_error, spread, added,
+        unseparated(*of_shown, directions), parts, matters,
     )  # fmt: skip
+
+
+def common_gain(problem: ModelProblem) -> float:
+    """Return the standard deviation of the prior of a gain that all FRFs share."""
+    calibration = problem.noise.calibration
+    said = None if calibration is None or calibration.setups is None else calibration.setups.setups
+    if said is not None and (said.gain is not None or said.common_gain > 0):
+        return 0.0  # what was stated is in the intervals beside the fit
+    return GAIN if any(side.part.is_uncertain for side in problem.prediction.sides) else 0.0
+
+
+def _gains(vector: ParameterVector, minimum: Minimum) -> tuple[GainError, ...]:
+    """Return the gains among the errors that differ from 1 by more than their standard deviation explains."""
+    std = np.sqrt(np.maximum(np.diagonal(inverse_information(minimum.information)), 0)) * vector.slope(minimum.x)
+    value = vector.to_values(minimum.x)[vector.free]
+    return tuple(
+        GainError(one.origin, int(one.place[0]), 1 + float(value[i]), float(std[i]))
+        for i, one in enumerate(vector.fitted)
+        if one.origin in _GAIN_ERRORS and abs(value[i]) > _NAMED_GAIN * std[i]
+    )
+
+
+def _matters(vector: ParameterVector, without: Minimum, minimum: Minimum) -> bool:
+    """Whether errors of the models change the joint, or widen its intervals, by a tenth of a standard error."""
+    n = vector.n_shown
+    joint = np.array([one.origin in ("joint", "mean") for one in vector.fitted[:n]], bool)
+    before, after = (np.diagonal(inverse_information(one.information))[:n][joint] for one in (without, minimum))
+    moved = (minimum.x[:n] - without.x[:n])[joint] ** 2
+    return bool(((after - before > _TENTH**2 * after) | (moved > _TENTH**2 * after)).any())
 
 
 @dataclass(frozen=True)
@@ -379,7 +494,7 @@ class _Profiles:
     """Profiles of the parameters at a minimum, each with its variance factor.
 
     The likelihood has one spread for joints that are alike: where most of a variance is due to others, `of_spread`, the
-    interval follows from it.
+    interval follows from it. There is none if the fit has failed.
     """
 
     likelihood: Likelihood
@@ -388,6 +503,7 @@ class _Profiles:
     covariance: FloatArray
     factor: FloatArray
     of_spread: NDArray[np.bool_]
+    has_failed: bool
 
     def _profile(self, factor: float) -> ProfileIntervals:
         least = self.minimum
@@ -395,12 +511,14 @@ class _Profiles:
 
     def of(self, i: int, probability: float) -> tuple[float, float]:
         """Return the interval of one parameter."""
+        if self.has_failed:
+            return self.vector.end(i, -1), self.vector.end(i, 1)
         if self.of_spread[i]:
             reach = np.sqrt(self.covariance[i, i] * self.factor[i]) * float(special.ndtri((1 + probability) / 2))
             step = np.eye(1, self.minimum.x.size, i)[0] * reach
             low, high = (self.vector.value(i, self.minimum.x + sign * step) for sign in (-1, 1))
             return low, high
-        with warnings.catch_warnings():
+        with one_thread(of_blas_only=True), warnings.catch_warnings():
             warnings.simplefilter("ignore", IllConditionedWarning)  # on the way to limits that are far off
             return self._profile(float(self.factor[i])).of(i, probability)
 
@@ -409,11 +527,14 @@ class _Profiles:
     ) -> tuple[float, float] | None:
         """Return the interval of a function of the parameters that depends on those with these numbers."""
         shown = self.vector.free[: self.factor.size]
+        if self.has_failed:
+            return -np.inf, np.inf
         if self.of_spread[used].any():
             return None
-        return self._profile(float(self.factor[used].max())).of_function(
-            lambda x: function(self.vector.to_values(x)[shown]), probability
-        )
+        with one_thread(of_blas_only=True):
+            return self._profile(float(self.factor[used].max())).of_function(
+                lambda x: function(self.vector.to_values(x)[shown]), probability
+            )
 
 
 def _residual(problem: ModelProblem, likelihood: Likelihood, minimum: Minimum) -> tuple[ComplexArray, ComplexArray]:

@@ -12,7 +12,7 @@ import numpy as np
 from jointfrf.identification.minimise import minimise
 from jointfrf.identification.model.fit import FoundModel, ModelProblem, fit_assembly
 from jointfrf.identification.model.next_channels import without_start
-from jointfrf.identification.model.uncertainty import ModelGradient
+from jointfrf.identification.model.uncertainty import ModelLinearised
 from jointfrf.identification.parameters import ParameterVector, joint_vector
 from jointfrf.kernel.arguments import ComplexArray
 from jointfrf.laws.law_joint import LawJoint
@@ -29,7 +29,7 @@ class JointMotion(NamedTuple):
         Of each joint DOF, j less k, per force as measured, m/N or rad/N.
     slopes : ndarray, shape (n, n_freq, n_o, n_i)
         Derivatives of the weighted FRFs by K*_dd.
-    gradient : ModelGradient
+    gradient : ModelLinearised
         Derivatives by the coordinates, residual, information.
     predicted : ndarray, shape (n_freq, n_o, n_i)
         FRFs, m/N.
@@ -37,7 +37,7 @@ class JointMotion(NamedTuple):
 
     per_force: ComplexArray
     slopes: ComplexArray
-    gradient: ModelGradient
+    gradient: ModelLinearised
     predicted: ComplexArray
 
 
@@ -92,5 +92,5 @@ class FoundMotion:
         out, into = prediction.joint_motion(vector, values)
         weight = likelihood.weight * np.outer(rows, columns)
         slopes = -(out.transpose(2, 0, 1)[..., None] * into.transpose(1, 0, 2)[:, :, None, :]) * weight
-        gradient = ModelGradient.of(likelihood, minimum, problem.noise.inflation)
+        gradient = ModelLinearised.of(likelihood, minimum, problem.noise.inflation)
         return JointMotion(into * columns, slopes, gradient, prediction.frfs(vector, values))

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.identification.minimise import Linearised
+from jointfrf.identification.minimise import NormalEquations
 from jointfrf.identification.model.prediction import Prediction
 from jointfrf.identification.parameters import ParameterVector
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -75,15 +75,15 @@ class WeightedResiduals(ABC):
         squares = _squares(self.weighted(self.difference(y))) + float((self.vector.pulls(x) ** 2).sum())
         return squares if np.isfinite(squares) else np.inf
 
-    def linearised(self, x: FloatArray) -> Linearised:
+    def linearised(self, x: FloatArray) -> NormalEquations:
         """Return the squares with information and gradient; infinite squares without where `cost` has none."""
         try:
             predicted = self.prediction.linearised(self.vector, self.vector.to_values(x))
         except np.linalg.LinAlgError:
-            return Linearised(np.inf, np.full((x.size, x.size), np.nan), np.full(x.size, np.nan))
+            return NormalEquations(np.inf, np.full((x.size, x.size), np.nan), np.full(x.size, np.nan))
         return self.about(x, *predicted)
 
-    def about(self, x: FloatArray, y: ComplexArray, slopes: ComplexArray) -> Linearised:
+    def about(self, x: FloatArray, y: ComplexArray, slopes: ComplexArray) -> NormalEquations:
         """Return the same by the prediction and its derivatives, which may be changed."""
         vector = self.vector
         residual = np.ascontiguousarray(self.weighted(self.difference(y)).ravel())
@@ -93,7 +93,7 @@ class WeightedResiduals(ABC):
         information = (real @ real.T) * np.outer(by_x, by_x) + of_pulls.T @ of_pulls
         gradient = (real @ residual.view(np.float64)) * by_x - of_pulls.T @ pulls
         cost = _squares(residual) + float((pulls**2).sum())
-        return Linearised(cost if np.isfinite(cost) else np.inf, information, gradient)
+        return NormalEquations(cost if np.isfinite(cost) else np.inf, information, gradient)
 
 
 @dataclass(frozen=True)
@@ -136,6 +136,11 @@ class Likelihood(WeightedResiduals):
             lower = np.linalg.cholesky(covariance)
             whitening = np.asarray(np.linalg.inv(lower) * weight.reshape(len(weight), 1, -1), np.complex128)
         return cls(prediction, vector, np.where(usable, measured, 0), weight, whitening)
+
+    def with_noise(self, factor: float) -> Likelihood:
+        """Return the likelihood for noise whose standard deviation is larger by a factor."""
+        whitening = None if self.whitening is None else self.whitening / factor
+        return replace(self, weight=self.weight / factor, whitening=whitening)
 
     def difference(self, y: ComplexArray) -> ComplexArray:
         """Return measured minus predicted FRFs, m/N."""

@@ -1,7 +1,8 @@
-"""Errors of a model that none of its unknowns describes: small symmetric changes of its modal matrices."""
+"""Errors of a model that none of its unknowns describes: of its modal matrices, and of its mode shapes at points."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,13 +22,14 @@ _RIGID = 1e-3
 
 
 class ErrorTerm(NamedTuple):
-    """An entry of the relative error of a modal matrix.
+    """An entry of the relative error of a modal matrix, or of the mode shapes at the channels.
 
     Attributes
     ----------
-    matrix : {"K", "M"}
+    matrix : {"K", "M", "P"}
+        Stiffness, mass, or mode shapes.
     row, column : int
-        Modes, row <= column.
+        Modes, row <= column; of mode shapes the number of the DOF, and the mode.
     weight : float
         Its standard deviation for a level of 1: 1 of modal stiffnesses and masses in the band, more beyond it.
     """
@@ -48,7 +50,11 @@ class ModalErrors:
     highest : float
         Largest angular frequency measured, rad/s.
     most : int
-        Largest number of terms.
+        Largest number of terms of the matrices, and of the mode shapes.
+    ports : ndarray, shape (m, r), optional
+        Motion of the DOFs by the coordinates.
+    at : sequence of int, optional
+        DOFs at which mode shapes have errors: channels that no joint touches.
 
     Notes
     -----
@@ -58,13 +64,20 @@ class ModalErrors:
     dispersion, so that an error of E, of a section, a mass or a clamp is one draw of them; rigid bodies stay free.
     Above the band the standard deviation grows with the square of the frequency, up to the ninefold.
 
+    Errors of mode shapes are independent between modes and DOFs, relative to the root mean square of all modes in the
+    band at the DOF: they change the residues of single FRFs, as positions of sensors, local flexibility and details of
+    the part do, and no natural frequency.
+
     References
     ----------
     .. [1] C. Soize, A nonparametric model of random uncertainties for reduced matrix models in structural dynamics,
        Probabilistic Engineering Mechanics 15 (2000) 277-294.
     """
 
-    def __init__(self, k: FloatArray, m: FloatArray, highest: float, most: int) -> None:
+    def __init__(
+        self, k: FloatArray, m: FloatArray, highest: float, most: int, ports: FloatArray | None = None,
+        at: Sequence[int] = (),
+    ) -> None:  # fmt: skip
         squared, shapes = linalg.eigh(k, m)
         w = np.sqrt(np.maximum(squared, 0))
         self.of_mass = m @ shapes
@@ -84,9 +97,39 @@ class ModalErrors:
             if matrix == "M" or a in elastic
         ]
         self.terms = (first + others)[:most]
+        self.shape_terms = [ErrorTerm("P", i, a, 1.0) for a in range(mixed) for i in at][:most]
+        self._ports = np.zeros((0, len(k))) if ports is None else ports
+        self._sizes = np.sqrt(np.mean((self._ports @ shapes[:, :mixed]) ** 2, axis=1))
+
+    def of_ports(self, errors: FloatArray) -> FloatArray:
+        """Return the change of the motion of the DOFs for values of all terms of mode shapes, shape (m, r)."""
+        change = np.zeros_like(self._ports)
+        for term, value in zip(self.shape_terms, errors, strict=True):
+            change[term.row] += value * self._sizes[term.row] * self.of_mass[:, term.column]
+        return change
+
+    def shape_slopes(
+        self, shapes: FloatArray, left: ComplexArray, right: ComplexArray, out: ComplexArray, into: ComplexArray
+    ) -> ComplexArray:
+        """Return the derivatives by all terms of mode shapes, shape (q, n_freq, n_o, n_i).
+
+        Parameters
+        ----------
+        shapes, left, right
+            As in `slopes`.
+        out, into : ndarray, shapes (n_freq, n_o, m), (n_freq, m, n_i)
+            dY = out dH into for the FRFs H between the DOFs.
+        """
+        turned = shapes.T @ self.of_mass[:, [one.column for one in self.shape_terms]]
+        to_left, to_right = left @ turned, turned.T @ right
+        rows = [one.row for one in self.shape_terms]
+        size = self._sizes[rows][:, None, None, None]
+        found = out[:, :, rows].transpose(2, 0, 1)[..., None] * to_right.swapaxes(0, 1)[:, :, None]
+        found += to_left.transpose(2, 0, 1)[..., None] * into[:, rows].swapaxes(0, 1)[:, :, None]
+        return np.asarray(found * size)
 
     def changes(self, errors: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the changes of K and M for values of all terms, shape (r, r) each."""
+        """Return the changes of K and M for values of their terms, shape (r, r) each."""
         found = []
         for matrix, own in (("K", self.of_stiffness), ("M", self.of_mass)):
             g = np.zeros((own.shape[1],) * 2)

@@ -123,7 +123,7 @@ def _candidates(part: Substructure, ends: Sequence[Sequence[str]], name: str) ->
     moving = [dof for dof in dofs if not is_rotation(dof.rpartition(":")[2])]
     at = np.unique(np.linspace(0, len(moving) - 1, _TRIED).astype(np.intp)).tolist() if moving else []
     joint = [dof.partition("/")[2] for end in ends for dof in end if dof.startswith(f"{name}/")]
-    own = [dof for dof in joint if not is_rotation(dof.rpartition(":")[2])]
+    own = [dof for dof in joint if part.has(dof) and not is_rotation(dof.rpartition(":")[2])]
     return list(dict.fromkeys([*own, *(moving[i] for i in at)]))
 
 

@@ -15,6 +15,8 @@ from jointfrf.identification.model.assembly import (
     Attachment,
     assembly_connection,
     attachment_factors,
+    connection_entries,
+    joint_connection,
     places_of,
 )
 from jointfrf.identification.model.reduced import ReducedSlope, ReducedSubstructure, SubstructureState, range_of
@@ -25,6 +27,7 @@ from jointfrf.identification.parameters import (
     ParameterOrigin,
     ParameterVector,
     joint_vector,
+    with_dampers,
 )
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
@@ -75,6 +78,21 @@ class _Coupled(NamedTuple):
     across_in: ComplexArray
 
 
+#: Errors of a part: of its modal matrices, of its mode shapes.
+_MODEL_ERRORS: tuple[ParameterOrigin, ParameterOrigin] = ("error", "shape-error")
+#: Gains among the parameters: their origin, the gain without an error, and whether each is one of a response or of a
+#: force; None if it is one of all FRFs.
+_GAINS: tuple[tuple[ParameterOrigin, float, bool | None], ...] = (
+    ("response", 0.0, True), ("force", 0.0, False), ("response-error", 1.0, True), ("force-error", 1.0, False),
+    ("common-error", 1.0, None),
+)  # fmt: skip
+
+
+def _of_channel(number: int, of_responses: bool | None) -> tuple[slice | int, ...]:
+    """Return the index of the FRFs of a gain, frequency first."""
+    return () if of_responses is None else (slice(None), number) if of_responses else (slice(None), slice(None), number)
+
+
 class Prediction:
     """The FRFs of an assembly as a function of all its parameters.
 
@@ -91,17 +109,27 @@ class Prediction:
         self.places = places_of(whole, responses, forces)
         self.responses, self.forces = self.places.at(responses), self.places.at(forces)
         self._last: tuple[tuple[SubstructureState, ...], _Open] | None = None
+        # Every FRF that is asked for has a joint or an attachment, or both a response and a force, at its ends.
+        between = {*itertools.chain(*whole.ports.ends), *itertools.chain(*(one.places for one in whole.attachments))}
+        between |= {*(forces if len(forces) < len(responses) else responses)}
         self.sides = tuple(
-            ReducedSubstructure(name, part, freq_hz, self.places.of[name]) for name, part in whole.parts.items()
+            ReducedSubstructure(
+                name,
+                part,
+                freq_hz,
+                self.places.of[name],
+                {dof for dof in self.places.of[name] if f"{name}/{dof}" in between},
+            )
+            for name, part in whole.parts.items()
         )
 
     def joint_stiffness(self) -> FloatArray:
         """Return the median over the lines of |(H_jj + H_kk)_dd|^-1, the size of stiffness that FRFs can show."""
         size = np.concatenate([abs(np.einsum("lpp->lp", side.at(side.part.nominal).h)) for side in self.sides], axis=1)
-        total = np.zeros((self.omega.size, len(self.whole.joint.dofs)))
-        for own in self.whole.ends:
-            held = [i for i, dof in enumerate(own) if dof]
-            total[:, held] += size[:, self.places.at([own[i] for i in held])]
+        ports, total = self.whole.ports, np.zeros((self.omega.size, len(self.whole.joint.dofs)))
+        for own in ports.ends:
+            held = [i for i, dof in enumerate(own) if dof and not ports.term[i]]  # of a region its mean motion
+            total[:, ports.dof[held]] += size[:, self.places.at([own[i] for i in held])] * ports.weight[held]
         found: FloatArray = np.median(1 / np.maximum(total, np.finfo(float).tiny), axis=0)
         return found
 
@@ -119,7 +147,7 @@ class Prediction:
         Returns
         -------
         LineCompliance or None
-            None where there are fewer responses or forces than joint DOFs.
+            None where there are fewer responses or forces than joint DOFs, or a joint acts on a region.
 
         Notes
         -----
@@ -127,7 +155,7 @@ class Prediction:
         columns weighted by their noise.
         """
         n = len(self.whole.joint.dofs)
-        if min(smooth.shape[1:]) < n:
+        if min(smooth.shape[1:]) < n or not self.whole.ports.is_plain:
             return None
         link, states = self._parts(vector, vector.values)
         h, e, rest = self._open(link, states).h, link.pattern[:, :n], slice(n, None)
@@ -153,10 +181,10 @@ class Prediction:
         free, to_out, to_in, between = (part[lines] for part in self._open(link, states)[1:])
         omega, own, gains = self.omega[lines], vector.places_of("joint"), self._gains(vector, values)
         s, t = link.s[lines], link.t[lines]
-        q = self.whole.joint.connection(omega[:1]).pattern.shape[1]
+        q = joint_connection(self.whole, self.whole.joint, omega[:1]).pattern.shape[1]
 
         def frfs(changed: FloatArray) -> ComplexArray:
-            joint = self.whole.joint.with_values(changed[own]).connection(omega)
+            joint = joint_connection(self.whole, self.whole.joint.with_values(changed[own]), omega)
             t[:, :q, :q] = joint.t
             with np.errstate(all="ignore"):
                 w = np.linalg.solve(s + t @ between, t)
@@ -181,12 +209,10 @@ class Prediction:
         self._model_slopes(vector, values, coupled, (link, states), slopes)
         if (gains != 1).any():
             slopes *= gains
-        for i in vector.places_of("response"):
-            row = int(vector.all[i].place[0])
-            slopes[i, :, row] = (coupled.y * gains)[:, row] / values[i]
-        for i in vector.places_of("force"):
-            column = int(vector.all[i].place[0])
-            slopes[i, :, :, column] = (coupled.y * gains)[:, :, column] / values[i]
+        for origin, base, of_responses in _GAINS:
+            for i in vector.places_of(origin):
+                which = _of_channel(int(vector.all[i].place[0]), of_responses)
+                slopes[i][which] = (coupled.y * gains)[which] / (base + values[i])
         return coupled.y * gains, slopes if len(slopes) == vector.free.size else slopes[vector.free]
 
     @property
@@ -222,15 +248,31 @@ class Prediction:
             unit[:, self.forces] - e @ (w @ opened.to_in),
         )
 
+    def _through(
+        self, opened: _Open, link: Connection, w: ComplexArray, own: slice, x: ComplexArray
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Return out x and x^T into for motions x of the DOFs of one substructure, shape (n_freq, m, r)."""
+        across = np.ascontiguousarray(motions_across(x.swapaxes(1, 2), link.pattern[own]).swapaxes(1, 2))
+        left, right = -((opened.to_out @ w) @ across), -(across.swapaxes(1, 2) @ (w @ opened.to_in))
+        number = range(own.start, own.stop)
+        for i, at in enumerate(self.responses):
+            if at in number:
+                left[:, i] += x[:, at - own.start]
+        for i, at in enumerate(self.forces):
+            if at in number:
+                right[:, :, i] += x[:, at - own.start]
+        return left, right
+
     def joint_motion(self, vector: ParameterVector, values: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Return motions across the joint per unit force, j less k, of forces at responses and at forces.
 
         Returns
         -------
         tuple of ndarray, shapes (n_freq, n_o, n) and (n_freq, n, n_i)
-            Without gains; the derivative of the FRFs by K*_dd is minus the product of both for DOF d.
+            Without gains; the derivative of the FRFs by K*_dd is minus the product of both for DOF d. Of joints on
+            regions n counts the coefficients of the motion there.
         """
-        n = len(self.whole.joint.dofs)
+        n = len(self.whole.ports.dof)
         coupled = self._coupled(*self._parts(vector, values))
         return coupled.across_out[:, :, :n], coupled.across_in[:, :n]
 
@@ -242,6 +284,12 @@ class Prediction:
     def _of_side(self, vector: ParameterVector, values: FloatArray, name: str) -> dict[str, float]:
         return {str(vector.all[i].place[1]): float(values[i]) for i in vector.places_of_part(name)}
 
+    def away_from_joints(self, name: str) -> list[int]:
+        """Return the numbers of those DOFs of a substructure that no joint and no attachment touches."""
+        attached = itertools.chain(*(one.places for one in self.whole.attachments))
+        taken = {*itertools.chain(*self.whole.ports.ends), *attached}
+        return [i for i, dof in enumerate(self.places.of[name]) if f"{name}/{dof}" not in taken]
+
     def _parts(self, vector: ParameterVector, values: FloatArray) -> tuple[Connection, tuple[SubstructureState, ...]]:
         """Return connections and substructures for values of all parameters."""
         joint = self.whole.joint.with_values(values[vector.places_of("joint")])
@@ -250,7 +298,10 @@ class Prediction:
             numbers[int(vector.all[i].place[0])].append(float(values[i]))
         link = assembly_connection(self.whole, self.places, self.omega, joint, numbers)
         states = [
-            side.at(self._of_side(vector, values, side.name), values[vector.places_of_part(side.name, "error")])
+            side.at(
+                self._of_side(vector, values, side.name),
+                *(values[vector.places_of_part(side.name, origin)] for origin in _MODEL_ERRORS),
+            )
             for side in self.sides
         ]
         return link, tuple(states)
@@ -259,13 +310,14 @@ class Prediction:
         """Return the FRFs before the substructures are connected; those of the same states are kept."""
         if self._last is None or any(one is not other for one, other in zip(self._last[0], states, strict=True)):
             h, e = _together(states), link.pattern
-            to_out = motions_across(h[:, self.responses], e)
-            to_in, to_connections = (
+            across = motions_across(h, e)
+            to_out = np.ascontiguousarray(across[:, self.responses])
+            to_in, between = (
                 np.ascontiguousarray(motions_across(own.swapaxes(1, 2), e).swapaxes(1, 2))
-                for own in (h[:, :, self.forces], h)
+                for own in (h[:, :, self.forces], across)
             )
             free = np.ascontiguousarray(h[:, self.responses][:, :, self.forces])
-            self._last = states, _Open(h, free, to_out, to_in, motions_across(to_connections, e))
+            self._last = states, _Open(h, free, to_out, to_in, between)
         return self._last[1]
 
     def _coupled(self, link: Connection, states: tuple[SubstructureState, ...]) -> _Coupled:
@@ -280,12 +332,12 @@ class Prediction:
 
     def channel_gains(self, vector: ParameterVector, values: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return measured over true FRFs by the calibration of responses, shape (n_o,), and of forces, (n_i,)."""
-        rows, columns = np.ones(len(self.responses)), np.ones(len(self.forces))
-        for i in vector.places_of("response"):
-            rows[int(vector.all[i].place[0])] = values[i]
-        for i in vector.places_of("force"):
-            columns[int(vector.all[i].place[0])] = values[i]
-        return rows, columns
+        gains = np.ones(len(self.responses)), np.ones(len(self.forces))
+        for origin, base, of_responses in _GAINS:
+            for i in vector.places_of(origin):
+                channel = slice(None) if of_responses is None else int(vector.all[i].place[0])
+                gains[not of_responses][channel] *= base + values[i]
+        return gains
 
     def _joint_slopes(
         self, vector: ParameterVector, values: FloatArray, coupled: _Coupled, slopes: ComplexArray
@@ -293,8 +345,8 @@ class Prediction:
         """Put the derivatives by joint and attachments into their places."""
         own = vector.places_of("joint")
         joint = self.whole.joint.with_values(values[own])
-        changes = dict(zip(own, joint.connection_slopes(self.omega), strict=True))
-        first = joint.connection(self.omega[:1]).pattern.shape[1]
+        changes = dict(zip(own, connection_entries(self.whole, joint, self.omega), strict=True))
+        first = joint_connection(self.whole, joint, self.omega[:1]).pattern.shape[1]
         starts = first + np.concatenate([[0], np.cumsum([len(one.places) for one in self.whole.attachments])])
         for i in vector.places_of("attachment"):
             at, number = (int(place) for place in vector.all[i].place)
@@ -334,18 +386,17 @@ class Prediction:
             first = own.stop
             of_part = vector.places_of_part(side.name)
             places = [i if vector.all[i].like is None else vector.all[i].like for i in of_part]
-            errors = vector.places_of_part(side.name, "error")
-            if not places and not errors:
+            errors, of_shapes = (vector.places_of_part(side.name, origin) for origin in _MODEL_ERRORS)
+            if not places and not errors and not of_shapes:
                 continue
             numbers = self._of_side(vector, values, side.name)
             of_side = side.slopes(numbers, [str(vector.all[i].place[1]) for i in of_part], state)
-            out, into = self._paths(opened, link, coupled.w, own)
-            left = out @ state.x
-            right = state.x.swapaxes(1, 2) @ into
+            left, right = self._through(opened, link, coupled.w, own, state.x)
             assert state.matrices is not None
             for i, slope in zip(places, of_side, strict=True):
                 slopes[i] += _by_slope(slope, state.matrices.eta, self.omega, left, right)
                 if slope.ports is not None:
+                    out, into = self._paths(opened, link, coupled.w, own)
                     slopes[i] += out @ (slope.ports @ right)
                     slopes[i] += (left @ slope.ports.T) @ into
             if errors and side.errors is not None:
@@ -354,6 +405,9 @@ class Prediction:
                 slopes[errors] = side.errors.slopes(
                     state.shapes, (1 + 1j * state.matrices.eta) * of_k, of_m * self.omega**2, left, right
                 )
+            if of_shapes and side.errors is not None:
+                paths = self._paths(opened, link, coupled.w, own)
+                slopes[of_shapes] = side.errors.shape_slopes(state.shapes, left, right, *paths)
 
 
 def _of_entries(out: ComplexArray, into: ComplexArray, std: FloatArray, *, both: bool) -> ComplexArray:
@@ -414,7 +468,7 @@ _FIRST_SPREAD = 0.3
 #: Units of unknowns of models by their usual names.
 _UNITS = {
     "youngs_modulus": "N/m^2", "density": "kg/m^3", "loss_factor": "1", "length": "m", "width": "m", "height": "m",
-    "poisson": "1",
+    "thickness": "m", "poisson": "1",
 }  # fmt: skip
 
 
@@ -441,7 +495,7 @@ def parameter_vector(
     ValueError
         `fixed` names what is no parameter of the joint.
     """
-    found = list(joint_vector(whole.joint, fixed, joint_stiffness).all)
+    found = with_dampers(joint_vector(whole.joint, fixed, joint_stiffness).all, whole.joint)
     means = _with_means(whole, found)
     for side, part in whole.parts.items():
         for name, unknown in part.fitted.items():

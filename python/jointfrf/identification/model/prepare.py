@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jointfrf.dofs import is_rotation
 from jointfrf.frf.setups import SetUps
 from jointfrf.identification.model.assembly import Assembly
 from jointfrf.identification.model.fit import ModelProblem
 from jointfrf.identification.model.prediction import Prediction, parameter_vector
 from jointfrf.identification.model.substructure import Unknown
-from jointfrf.identification.noise import NoiseOptions, noise_of_channels
+from jointfrf.identification.noise import NoiseOptions, noise_of_channels, without_mass
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_lines, check_type
 from jointfrf.laws.law_joint import LawJoint
 
@@ -88,6 +89,8 @@ def prepare_model_fit(
     if noise.setups is not None:
         check_type("setups", noise.setups, SetUps)
         noise.setups.check_fits(lines.shape)
+    is_translation = not any(is_rotation(name.rpartition(":")[2]) for name in channels.responses)
+    lines, mass = without_mass(freq, lines, noise.sensor_mass, is_square=reciprocal, is_translation=is_translation)
     found = noise_of_channels(freq, lines, shown, noise, reciprocal=reciprocal)
     variance = found.variance
     prediction = Prediction(whole, freq, channels.responses, channels.forces)
@@ -106,7 +109,15 @@ def prepare_model_fit(
         return start(whole.joint, freq, gamma, variance[:, at[0]][:, :, at[1]])
 
     return ModelProblem(
-        prediction, vector, freq, np.where(shown, lines, np.nan), variance, found.smooth, found.noise, at, joint_start
+        prediction,
+        vector,
+        freq,
+        np.where(shown, lines, np.nan),
+        variance,
+        found.smooth,
+        replace(found.noise, mass=mass),
+        at,
+        joint_start,
     )
 
 

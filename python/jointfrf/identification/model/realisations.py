@@ -110,8 +110,10 @@ class _Start:
         """Return E|e|^2 of FRFs about fitted ones, inf where nothing is measured, and its median level."""
         used = np.isfinite(self._problem.variance).all(axis=0)
         squares, size = (np.asarray((abs(part[:, used]) ** 2).T, float, "C") for part in (h - y, y))
-        relative, floor = noise_about(squares, size)
-        own = np.maximum(relative[:, None] * size + floor[:, None], np.finfo(float).tiny)
+        freq, model = self._problem.freq_hz, self._problem.noise.model
+        shape = np.ones(freq.size) if model is None else model.floor_shape(freq)
+        relative, floor, _ = noise_about(squares, size, shape)
+        own = np.maximum(relative[:, None] * size + floor[:, None] * shape, np.finfo(float).tiny)
         variance = np.full(h.shape, np.inf)
         variance[:, used] = own.T
         return variance, float(np.median(np.sqrt(own / np.maximum(size, np.finfo(float).tiny))))

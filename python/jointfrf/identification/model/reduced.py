@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -74,7 +74,7 @@ class SubstructureState(NamedTuple):
     Attributes
     ----------
     h : ndarray, shape (n_freq, m, m)
-        m/N.
+        m/N; 0 for those that are not asked for.
     x : ndarray, shape (n_freq, m, r)
         P Z^-1: modal coordinates by forces at the ports; r = 0 for FRFs.
     matrices : _Matrices or None
@@ -121,10 +121,17 @@ class ReducedSubstructure:
     part : Substructure
     freq_hz : ndarray, shape (n_freq,)
     dofs : sequence of str, length m
+    between : sequence of str, optional
+        Those of which at least one is in each FRF that is asked for: the model is reduced for forces there. All by
+        default.
     """
 
-    def __init__(self, name: str, part: Substructure, freq_hz: FloatArray, dofs: Sequence[str]) -> None:
+    def __init__(
+        self, name: str, part: Substructure, freq_hz: FloatArray, dofs: Sequence[str],
+        between: Collection[str] | None = None,
+    ) -> None:  # fmt: skip
         self.name, self.part, self.freq_hz, self.dofs = name, part, freq_hz, tuple(dofs)
+        self._between = [i for i, dof in enumerate(dofs) if between is None or dof in between]
         self.omega = 2 * np.pi * freq_hz
         self.basis = np.zeros((0, 0))
         self.errors: ModalErrors | None = None
@@ -168,7 +175,7 @@ class ReducedSubstructure:
         band = np.linspace(low, high, min(max(self.freq_hz.size, 2), 400))
         for values in trials:
             model = self.part.model(values)
-            ports = as_ports("dofs", model.ports(*self.dofs), len(model.dofs))
+            ports = as_ports("dofs", model.ports(*(self.dofs[i] for i in self._between)), len(model.dofs))
             matrices = ModelMatrices(model.stiffness, model.mass, None, None, max(model.loss_factor, 1e-3))
             found.append(reduce_model(band, matrices, ports, ports, _TOLERANCE).shapes)
         scale = np.sqrt(np.maximum(_diagonal(self.part.nominal_model.mass), 1e-30))
@@ -221,20 +228,27 @@ class ReducedSubstructure:
                 own = own._replace(eta=values[name])
         return own
 
-    def allow_errors(self, most: int) -> None:
-        """Let the modal matrices be off by at most so many terms, from now on."""
+    def allow_errors(self, most: int, at: Sequence[int] = ()) -> None:
+        """Let modal matrices, and mode shapes at some DOFs, be off by at most so many terms each, from now on."""
         if not isinstance(self.part.source, FrfSource):
             own = self._unscaled(self.part.nominal)
-            self.errors = ModalErrors(own.k, own.m, float(self.omega.max()), most)
+            self.errors = ModalErrors(own.k, own.m, float(self.omega.max()), most, own.ports, at)
 
-    def at(self, values: Mapping[str, float], errors: FloatArray | None = None) -> SubstructureState:
+    def at(
+        self, values: Mapping[str, float], errors: FloatArray | None = None, of_shapes: FloatArray | None = None
+    ) -> SubstructureState:
         """Return the FRFs for values of all unknowns, and of the terms of `errors` where there are any."""
-        key = (*values.values(), *([] if errors is None else errors.tolist()))
+        given = [one if one is not None and self.errors is not None else np.zeros(0) for one in (errors, of_shapes)]
+        key = (*values.values(), *given[0].tolist())
+        if given[1].size:
+            key = (*key, np.inf, *given[1].tolist())
         if self._last is None or self._last[0] != key:
             own = self._unscaled(values)
-            if self.errors is not None and errors is not None and errors.size:
-                of_k, of_m = self.errors.changes(errors)
+            if self.errors is not None and given[0].size:
+                of_k, of_m = self.errors.changes(given[0])
                 own = own._replace(k=own.k + of_k, m=own.m + of_m)
+            if self.errors is not None and given[1].size:
+                own = own._replace(ports=own.ports + self.errors.of_ports(given[1]))
             self._last = (key, self._state(self._scaled(own, values)))
         return self._last[1]
 
@@ -244,12 +258,12 @@ class ReducedSubstructure:
                  for name in ("youngs_modulus", "density")]  # fmt: skip
         return found[0], found[1]
 
-    def _state(self, own: _Matrices) -> SubstructureState:
-        squared, shapes = linalg.eigh(own.k, own.m)
-        seen = own.ports @ shapes
-        diagonal = (1 + 1j * own.eta) * squared - self.omega[:, None] ** 2
+    def _state(self, matrices: _Matrices) -> SubstructureState:
+        squared, shapes = linalg.eigh(matrices.k, matrices.m)
+        seen = matrices.ports @ shapes
+        diagonal = (1 + 1j * matrices.eta) * squared - self.omega[:, None] ** 2
         full: list[tuple[Any, Any]] = []
-        for matrix, factor in ((own.c, 1j * self.omega), (own.h, 1j + 0 * self.omega)):
+        for matrix, factor in ((matrices.c, 1j * self.omega), (matrices.h, 1j + 0 * self.omega)):
             if matrix is None:
                 continue
             modal = shapes.T @ matrix @ shapes
@@ -270,10 +284,16 @@ class ReducedSubstructure:
             of_modes = 1 / diagonal
             x = of_modes[:, None, :] * seen
             # Residues are real: two real products of all lines.
-            residues = (seen[:, None] * seen).reshape(-1, squared.size).T
-            h = np.empty((self.omega.size, len(seen), len(seen)), np.complex128)
-            h.real, h.imag = ((part @ residues).reshape(h.shape) for part in (of_modes.real, of_modes.imag))
-        return SubstructureState(np.asarray(h), np.asarray(x), own, squared, shapes)
+            own = seen[self._between]
+            residues = (seen[:, None] * own).reshape(-1, squared.size).T
+            columns = np.empty((self.omega.size, len(seen), len(own)), np.complex128)
+            for into, part in ((columns.real, of_modes.real), (columns.imag, of_modes.imag)):
+                into[:] = (part @ residues).reshape(into.shape)
+            h = columns
+            if len(own) < len(seen):
+                h = np.zeros((self.omega.size, len(seen), len(seen)), np.complex128)
+                h[:, self._between], h[:, :, self._between] = columns.swapaxes(1, 2), columns
+        return SubstructureState(np.asarray(h), np.asarray(x), matrices, squared, shapes)
 
     def slopes(self, values: Mapping[str, float], names: Sequence[str], state: SubstructureState) -> list[ReducedSlope]:
         """Return the derivatives by some of the unknowns, in the modal coordinates of the state at these values."""
@@ -343,7 +363,8 @@ class ReducedSubstructure:
         for line in np.unique(np.linspace(0, self.freq_hz.size - 1, spots + 2).astype(int)[1:-1]):
             factors = solver.factor(matrices.dynamic_stiffness(self.omega[line]), matrices.are_symmetric)
             exact = ports.of(factors.solve(ports.forces().astype(complex)))
-            worst = max(worst, float(abs(found[line] - exact).max() / abs(exact).max()))
+            asked = found[line] != 0
+            worst = max(worst, float(abs(found[line] - exact)[asked].max(initial=0) / abs(exact).max()))
         return worst
 
 

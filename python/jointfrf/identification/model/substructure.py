@@ -25,6 +25,7 @@ from jointfrf.kernel.arguments import (
     one_line,
 )
 from jointfrf.models.model import Model
+from jointfrf.models.points import PointModel, Region
 
 __all__ = ["FrfSource", "Substructure", "Unknown"]
 
@@ -138,12 +139,12 @@ class Substructure:
         Of a `Model`: ``"youngs_modulus"`` scales K and H, ``"density"`` scales M, ``"loss_factor"`` is its eta. Of a
         function: its arguments.
     exact : bool
-        Whether nothing else of a model is unknown. By default none is exact: Young's modulus and density, where they
-        are not among the unknowns, are fitted as factors of K and M under priors of 3 % and 1 %, the coefficients of
-        variation of structural steel [1]_.
+        Whether nothing else of a model is unknown, except its `model_error` if one is given. By default none is exact:
+        Young's modulus and density, where they are not among the unknowns, are fitted as factors of K and M under
+        priors of 3 % and 1 %, the coefficients of variation of structural steel [1]_.
     model_error : float, optional
         Relative standard deviation of each modal stiffness and mass of the free substructure that is believed beside
-        what its unknowns describe: mesh, clamps, small masses. 0.005 by default, 0 of a model that is exact.
+        what its unknowns describe: mesh, clamps, small masses. 0.005 by default, and 0 if it is exact.
 
     References
     ----------
@@ -153,8 +154,7 @@ class Substructure:
     Raises
     ------
     ValueError
-        An unknown that the source does not have; unknowns or errors of FRFs; an error that is negative or above 0.1,
-        or of what is exact.
+        An unknown that the source does not have; unknowns or errors of FRFs; an error that is negative or above 0.1.
 
     Examples
     --------
@@ -197,8 +197,8 @@ class Substructure:
             object.__setattr__(self, "model_error", as_number("model_error", self.model_error))
             if not 0 <= self.model_error <= _LARGEST_ERROR:
                 raise ValueError(f"model_error must be 0 to {_LARGEST_ERROR:g}, not {self.model_error:g}")
-            if self.model_error and (self.exact or isinstance(self.source, FrfSource)):
-                raise ValueError("model_error: FRFs, and a model that is exact, have none")
+            if self.model_error and isinstance(self.source, FrfSource):
+                raise ValueError("FRFs have no model_error; give the noise of the FRFs (noise)")
 
     @classmethod
     def of_frfs(
@@ -251,6 +251,11 @@ class Substructure:
             return dict(self.unknowns)
         errors = {name: Unknown(1.0, std, 0.0) for name, std in _NEVER_EXACT.items() if name not in self.unknowns}
         return {**self.unknowns, **errors}
+
+    @property
+    def is_uncertain(self) -> bool:
+        """Whether it is a model that is not exact: FRFs of an assembly then hardly show a gain that all share."""
+        return not isinstance(self.source, FrfSource) and (not self.exact or self.error_level > 0)
 
     @property
     def error_level(self) -> float:
@@ -316,6 +321,16 @@ class Substructure:
         except ValueError:
             return False
         return True
+
+    def region(self, dof: str) -> Region | None:
+        """Return the region of which ``"edge:z"`` is the motion; None of other DOFs."""
+        return self.nominal_model.regions[dof.rpartition(":")[0]] if self.region_ports(dof) else None  # type: ignore[attr-defined]
+
+    def region_ports(self, dof: str) -> tuple[str, ...]:
+        """Return the coefficients of the motion of a region; none of other DOFs."""
+        if isinstance(self.source, FrfSource) or not isinstance(self.nominal_model, PointModel):
+            return ()
+        return self.nominal_model.region_ports(dof)
 
     def receptance(self, freq_hz: FloatArray, dofs: Sequence[str]) -> ComplexArray:
         """Return the receptances between DOFs as believed, shape (n_freq, m, m), m/N."""

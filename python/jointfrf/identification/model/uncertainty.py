@@ -1,42 +1,61 @@
-"""Uncertainty of a fit of an assembly beyond independent noise: scatter of its gradient, channels a little off."""
+"""The likelihood of FRFs of an assembly, linearised at its minimum."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
-from jointfrf.frf.calibration import CalibrationErrors, ErrorKind
-from jointfrf.identification.calibration import CalibrationSpread, Effects, effects_by_function
+from jointfrf.identification.linearised import Linearised, LineParts
 from jointfrf.identification.minimise import Minimum, inverse_information
 from jointfrf.identification.model.likelihood import Likelihood
-from jointfrf.identification.scatter import (
-    BLOCKS,
-    LineParts,
-    Scatter,
-    Spread,
-    block_members,
-    scatter_of,
-    spread_of_scatters,
-)
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["ModelGradient"]
+__all__ = ["BandHomogeneity", "ModelLinearised", "band_homogeneity"]
 
-#: The FRFs do not hold a logarithm, or a multiple of a value, with a standard deviation above this.
-_HELD = 100.0
+#: Standard deviation of a logarithm, or of a value relative to the nominal one, above which it is not determined.
+_DETERMINED = 100.0
 
 
-@dataclass(frozen=True)
-class ModelGradient:
-    """What each FRF adds to the normal equations on each line, at a minimum.
+#: Parts of a band without gaps, a gap in mean distances of lines, and lines of a part for each parameter.
+_PARTS, _GAP, _LINES = 4, 10, 2
+#: Probability at which parts that differ are taken to differ by noise.
+_CHANCE = 1e-3
+
+
+class BandHomogeneity(NamedTuple):
+    """Whether parts of the band show the same parameters: a test of homogeneity.
 
     Attributes
     ----------
-    information : ndarray, shape (p, p)
-        Of the coordinates, priors included.
+    spans : tuple of (float, float)
+        Hz.
+    steps : ndarray, shape (n_parts, p)
+        Coordinates by each part less those by all lines, by one Gauss-Newton step; NaN where a part shows none.
+    factor : ndarray, shape (p,)
+        By which variances grow until the interval covers the parts; 1 where chance explains the differences.
+    apart : ndarray of int, shape (p, 2)
+        The two parts that differ most, relative to their standard errors, the one further from all lines first.
+    """
+
+    spans: tuple[tuple[float, float], ...]
+    steps: FloatArray
+    factor: FloatArray
+    apart: NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class ModelLinearised(Linearised):
+    """The likelihood of FRFs of an assembly about its minimum, in coordinates of the parameters that are shown.
+
+    Attributes
+    ----------
+    n_freq, information, slope, priors, determined
+        As in `Linearised`.
     inflation : float
         Lines that carry the noise of one independent line: 1 over it is the mean square of a real residual.
     slopes : ndarray, shape (p, n_freq, n_o, n_i)
@@ -47,24 +66,22 @@ class ModelGradient:
         Change of the gradient (its real part) by a relative error of 1 of each FRF.
     squares : ndarray, shape (n_freq, n_o, n_i)
         Of the weighted residual that such an error leaves.
-    priors : LineParts
-        Of each prior.
-    held : ndarray of bool, shape (p,)
-        Coordinates that the FRFs hold: what scatters along others is rounding.
     """
 
+    n_freq: int
     information: FloatArray
+    slope: FloatArray
+    priors: LineParts
+    determined: NDArray[np.bool_]
     inflation: float
     slopes: ComplexArray
     residual: ComplexArray
     of_errors: ComplexArray
     squares: FloatArray
-    priors: LineParts
-    held: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, likelihood: Likelihood, minimum: Minimum, inflation: float) -> ModelGradient:
-        """Return the parts at a minimum of a likelihood, of the parameters that are shown; others are eliminated."""
+    def of(cls, likelihood: Likelihood, minimum: Minimum, inflation: float) -> ModelLinearised:
+        """Return the parts at a minimum of a likelihood; parameters that are not shown are eliminated."""
         vector, x, n = likelihood.vector, minimum.x, likelihood.vector.n_shown
         y, slopes = likelihood.prediction.linearised(vector, vector.to_values(x))
         whole = minimum.information
@@ -81,83 +98,85 @@ class ModelGradient:
         squares = np.asarray(abs(y) ** 2 * likelihood.precision, np.float64)
         information = kept @ whole @ kept.T
         size = np.where(vector.is_log, 1, np.maximum(abs(x), 1))[:n]
-        held = np.diagonal(information) * size**2 > _HELD**-2
-        return cls(information, inflation, slopes, residual, of_errors, squares, priors, held)
+        determined = np.diagonal(information) * size**2 > _DETERMINED**-2
+        slope = np.diag(vector.slope(x)[:n])
+        return cls(
+            len(residual), information, slope, priors, determined, inflation, slopes, residual, of_errors, squares
+        )
 
-    @cached_property
-    def covariance(self) -> FloatArray:
-        """Covariance of the coordinates, from noise as known, shape (p, p)."""
-        return inverse_information(self.information, open_ends=True)
+    def lines(self, which: slice) -> LineParts:
+        """Return the parts of some lines."""
+        return self._parts(1, which)
 
-    @cached_property
-    def _of_held(self) -> FloatArray:
-        """The information on what is held."""
-        return self.information[np.ix_(self.held, self.held)]
+    def channels(self) -> Iterator[LineParts]:
+        """Yield the parts of all responses, then those of all forces, if there are several."""
+        for axis in (2, 3):
+            if self.slopes.shape[axis] > 1:
+                yield self._parts(axis)
 
-    def _parts(self, axis: int) -> LineParts:
-        """Return the parts of each line (axis 1), response (2) or force (3), and of each prior, in what is held."""
-        slopes = np.ascontiguousarray(np.moveaxis(self.slopes, axis, 0))
+    def _parts(self, axis: int, which: slice = slice(None)) -> LineParts:
+        """Return the parts along an axis of the slopes: lines (1), responses (2) or forces (3)."""
+        slopes = np.ascontiguousarray(np.moveaxis(self.slopes, axis, 0)[which])
         flat = slopes.reshape(*slopes.shape[:2], -1).view(np.float64)
-        residual = np.ascontiguousarray(np.moveaxis(self.residual, axis - 1, 0)).reshape(len(flat), -1)
+        residual = np.ascontiguousarray(np.moveaxis(self.residual, axis - 1, 0)[which]).reshape(len(flat), -1)
         gradient = (flat @ residual.view(np.float64)[:, :, None])[..., 0]
-        gradient = np.concatenate([gradient, self.priors.gradient])
-        information = np.concatenate([flat @ flat.swapaxes(1, 2), self.priors.information])
-        return LineParts(gradient[:, self.held], information[:, self.held][:, :, self.held])
+        return LineParts(gradient, flat @ flat.swapaxes(1, 2))
 
-    def spread(self, by_noise: float, beside: FloatArray | float = 0.0, motion: FloatArray | None = None) -> Spread:
-        """Return variance factors by the scatter between lines, blocks, responses and forces.
+    def errors(self, masks: NDArray[np.bool_], lines: slice) -> Iterator[tuple[ComplexArray, FloatArray]]:
+        """Yield the effect of a relative error of 1 of the FRFs in each mask."""
+        for mask in masks:
+            gradient = self.of_errors[:, lines, mask].sum(axis=2).T
+            yield gradient, self.squares[lines, mask].sum(axis=1) * (self.inflation / 2)
 
-        Parameters
-        ----------
-        by_noise : float
-            Variance factor by the residual.
-        beside : ndarray, shape (p,)
-            Variance that smooth errors of channels add, likewise.
-        motion : ndarray, shape (n_freq,), optional
-            Size of the motion on each line, if the FRFs depend on amplitude.
-        """
-        _, n_freq, n_o, n_i = self.slopes.shape
-        lines = self._parts(1)
-        of_lines, of_blocks, between = self._scatter(lines, self.inflation), *(Scatter.none(len(self.slopes)),) * 2
-        share = np.einsum("lpp->lp", lines.information[:n_freq]) / np.diagonal(self._of_held)
-        seen = np.flatnonzero(share.any(axis=1))
-        if seen.size >= 2 * BLOCKS:
-            of_blocks = self._scatter(self._grouped(lines, block_members(share, seen)))
-            if motion is not None:
-                by_motion = seen[np.argsort(motion[seen], kind="stable")]
-                between = self._scatter(self._grouped(lines, block_members(share, by_motion)))
-        hits = [self._scatter(self._parts(axis)) for axis, count in ((2, n_o), (3, n_i)) if count > 1]
-        spread = spread_of_scatters(np.full(self.held.size, by_noise), of_lines, of_blocks, hits, beside)
-        return spread if motion is None else spread.between_amplitudes(between)
 
-    def _grouped(self, lines: LineParts, member: FloatArray) -> LineParts:
-        """Return groups of lines, by which lines are in which, shape (n_groups, n_freq), with priors as they are."""
-        n_priors = len(self.priors.gradient)
-        whole = np.zeros((len(member) + n_priors, member.shape[1] + n_priors))
-        whole[: len(member), : member.shape[1]], whole[len(member) :, member.shape[1] :] = member, np.eye(n_priors)
-        return LineParts(whole @ lines.gradient, np.tensordot(whole, lines.information, 1))
+def band_homogeneity(at: ModelLinearised, freq_hz: FloatArray, factor: FloatArray) -> BandHomogeneity:
+    """Compare parts of the band, each fitted by itself.
 
-    def _scatter(self, parts: LineParts, correlated: float = 1.0) -> Scatter:
-        found = Scatter.none(self.held.size)
-        if self.held.any():
-            variance, degrees = scatter_of(self._of_held, [parts])
-            with np.errstate(divide="ignore", invalid="ignore"):
-                known = np.diagonal(inverse_information(self._of_held, open_ends=True))
-                found.factor[self.held] = correlated * variance / known
-            found.degrees[self.held] = degrees / correlated
-        return found
+    Parameters
+    ----------
+    at : ModelLinearised
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    factor : ndarray, shape (p,)
+        Variance factors by the scatter between lines and blocks of lines.
 
-    def calibration(self, errors: CalibrationErrors, freq_hz: FloatArray) -> CalibrationSpread:
-        """Return what errors of FRFs that are smooth over frequency add to the coordinates."""
-        functions = errors.functions(freq_hz)
-        gradient, squares = self.of_errors, self.squares * (self.inflation / 2)
-
-        def effects(kind: ErrorKind) -> Effects:
-            masks = errors.masks(kind, squares.shape[1:])
-            each = [
-                (gradient[:, :, mask].sum(axis=2).T, np.asarray(squares[:, mask].sum(axis=1), np.float64))
-                for mask in masks
-            ]
-            return effects_by_function(each, functions, self.covariance)
-
-        return CalibrationSpread.of(errors, np.eye(len(gradient)), effects)
+    Notes
+    -----
+    Parts are those between gaps of the lines, or quarters of the band. Squares of the differences from all lines, over
+    their variance, follow chi-squared if the parts agree. If they do not, the difference is an error of the models or
+    of the joint, which no number of parts averages out: the variance of the mean is no less than that of a part.
+    """
+    order, p = np.argsort(freq_hz), len(at.slope)
+    distance = np.diff(freq_hz[order])
+    ends = np.flatnonzero(distance > _GAP * np.median(distance)) + 1 if distance.size else np.zeros(0, np.intp)
+    least = _LINES * (p + 1)
+    own = [one for one in np.split(order, ends) if one.size >= least]
+    if len(own) < 2:
+        own = [one for one in np.array_split(order, _PARTS) if one.size >= least]
+    spans = tuple((float(freq_hz[one[0]]), float(freq_hz[one[-1]])) for one in own)
+    steps, grown, apart = np.full((len(own), p), np.nan), np.ones(p), np.zeros((p, 2), np.intp)
+    if len(own) < 2:
+        return BandHomogeneity(spans, steps, grown, apart)
+    member = np.zeros((len(own), freq_hz.size))
+    for row, lines in zip(member, own, strict=True):
+        row[lines] = 1
+    parts = at.grouped(member)
+    n, variance = len(own), np.full((len(own), p), np.nan)
+    of_priors = parts.gradient[n:].sum(axis=0), parts.information[n:].sum(axis=0)
+    for i in range(n):
+        covariance = inverse_information(parts.information[i] + of_priors[1], open_ends=True)
+        steps[i] = covariance @ (parts.gradient[i] + of_priors[0])
+        variance[i] = np.maximum(np.diagonal(covariance - at.covariance), 0) * factor
+    shown = (variance > 0) & at.determined
+    steps[~shown] = np.nan
+    for i in np.flatnonzero(shown.sum(axis=0) > 1).tolist():
+        which = np.flatnonzero(shown[:, i])
+        step, weight = steps[which, i], 1 / variance[which, i]
+        squares = float(step**2 @ weight)
+        if special.chdtrc(which.size - 1, squares) < _CHANCE / p:
+            of_part = squares / weight.sum() / (at.covariance[i, i] * factor[i])
+            grown[i] = max(squares / (which.size - 1), of_part)
+            difference = (step[:, None] - step) ** 2 / (1 / weight[:, None] + 1 / weight)
+            pair = which[list(np.unravel_index(int(difference.argmax()), difference.shape))]
+            apart[i] = pair[np.argsort(-abs(steps[pair, i]))]
+    return BandHomogeneity(spans, steps, grown, apart)

@@ -1,0 +1,1 @@
+"""Arguments of the commands: one module for each subcommand, which imports nothing that computes."""
