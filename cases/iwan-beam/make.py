@@ -1,9 +1,10 @@
-"""Write level_1.uff to level_8.uff and backbone.csv beside this file: a beam with an Iwan joint, by harmonic balance.
+"""Write level_1.uff to level_8.uff, backbone.csv (by harmonic balance) and decay.csv (through time) beside this file.
 
 PYTHONPATH=tests/python/support .venv/bin/python cases/iwan-beam/make.py [FOLDER]
 """
 
 import sys
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from scipy.optimize import brentq
 import jointfrf as jf
 from harmonic_balance import Sliders, iwan_beam
 from jointfrf.io import Channel, FrfSet, write_uff
+from ring_down import ring_down
 
 #: Slip moment in N m, stiffness at rest in N m/rad, chi, beta.
 IWAN = (20.0, 1.2e5, -0.4, 0.8)
@@ -46,9 +48,23 @@ def backbone() -> str:
     return "\n".join(rows) + "\n"
 
 
+def decay() -> str:
+    """Return a ring-down after a hit at the free end of A: three accelerometers with offset, drift and noise."""
+    beam = iwan_beam(Sliders.iwan(*IWAN), youngs_modulus=(1.004 * 210e9, 0.998 * 210e9), loss_factor=0.0012)
+    viscous = beam.stiffness.imag / (2 * np.pi * 235)  # as much at the mode
+    own = ring_down([replace(beam, stiffness=beam.stiffness.real, damping=viscous)], 2048.0, 1.2, hit=60.0, pulse=4e-3)
+    motion = np.vstack([np.zeros((100, 3)), own.acceleration[0][:, [0, 1, 3]] * [1, 1, -1]])
+    rng, time = np.random.default_rng(0), np.arange(len(motion)) / 2048
+    motion += 0.03 * rng.normal(size=motion.shape) + [0.4, -0.2, 0.3] + time[:, None] * [0.1, 0.3, -0.2]
+    rows = ["time [s],11:+y [m/s^2],12:+y [m/s^2],22:-y [m/s^2]"]
+    rows += [f"{t:.6f},{','.join(f'{one:.3f}' for one in own)}" for t, own in zip(time, motion, strict=True)]
+    return "\n".join(rows) + "\n"
+
+
 if __name__ == "__main__":
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
     for level, held in enumerate(LEVELS):
         title = f"Simulated stepped sine, free end of B held at {held:g} m"
         write_uff(folder / f"level_{level + 1}.uff", measured(level), title=title, single=True)
     (folder / "backbone.csv").write_text(backbone())
+    (folder / "decay.csv").write_text(decay())
