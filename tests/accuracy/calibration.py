@@ -24,7 +24,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python" / "support"))
 
 import models
-from fits import truth_of
+from fits import bound_of, true_values
 from trials import Trial, running_mean, system
 
 import jointfrf as jf
@@ -202,7 +202,8 @@ def one_draw(trial: CalibrationTrial, place: int, number: int) -> Draw | None:
 def truth(trial: CalibrationTrial) -> tuple[dict[str, float], dict[str, float]]:
     """Parameters, and their Cramer-Rao bound for the noise of each FRF by itself."""
     if trial.fit == "joint":
-        return truth_of(Trial("3.3", "complex", trial.level))
+        own = Trial("3.3", "complex", trial.level)
+        return true_values(own), bound_of(own)
     channels = models.CHANNELS[trial.fit]
     bound = model_bound(models.whole(models.TRUE), models.FREQ, channels, channels, trial.level, {})
     return dict(zip(("k_y", "c_y", "k_theta", "c_theta"), (6e5, 20.0, 5e3, 1.5), strict=True)), bound

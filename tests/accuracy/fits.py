@@ -29,7 +29,7 @@ from trials import SIZES, TRIALS, Trial
 import jointfrf as jf
 from cramer_rao import cramer_rao
 from jointfrf.dofs import Parameter, parameters_shared
-from jointfrf.identification.manifold.coordinates import joint_terms
+from jointfrf.identification.manifold.coordinates import JointTerms, joint_terms
 
 #: Terms of a truth that is not named by them.
 _TERMS = {"free": "viscous", "free, undamped": "none", "pin": "viscous", "pin, undamped": "none"}
@@ -90,8 +90,20 @@ def sizes_of(trial: Trial, gamma: np.ndarray, freq: np.ndarray) -> np.ndarray:
     return abs(SIZES[trial.noise](gamma, freq) if trial.noise in SIZES else gamma)
 
 
-def truth_of(trial: Trial) -> tuple[dict[str, float], dict[str, float]]:
-    """Parameters of the joint, and their Cramer-Rao bound.
+def true_values(trial: Trial) -> dict[str, float]:
+    """Return the parameters of the joint."""
+    joint, terms = trial.exact.joint, _terms_of(trial, trial.exact.freq_hz)
+    matrices = {0: joint.stiffness, 1: joint.structural_damping, 2: joint.damping}
+    values = [matrices[kind][a, b] for kind, (a, b) in zip(terms.kinds, terms.pairs, strict=True)]
+    return dict(zip([one.name for one in terms.parameters], values, strict=True))
+
+
+def _terms_of(trial: Trial, freq: np.ndarray) -> JointTerms:
+    return joint_terms(2 * np.pi * freq, trial.exact.joint.dofs, _TERMS.get(trial.kind, trial.kind), trial.cross)
+
+
+def bound_of(trial: Trial) -> dict[str, float]:
+    """Return the Cramer-Rao bound of the parameters of the joint.
 
     For the noise as it is, where it is independent and circular; else as if it were that, and relative to each entry.
     """
@@ -99,9 +111,7 @@ def truth_of(trial: Trial) -> tuple[dict[str, float], dict[str, float]]:
     if "missing" in trial.noise:
         # The same share of the lines, evenly spread.
         freq, gamma = (np.delete(one, np.s_[::5], axis=0) for one in (freq, gamma))
-    terms = joint_terms(2 * np.pi * freq, joint.dofs, _TERMS.get(trial.kind, trial.kind), trial.cross)
-    matrices = {0: joint.stiffness, 1: joint.structural_damping, 2: joint.damping}
-    values = [matrices[kind][a, b] for kind, (a, b) in zip(terms.kinds, terms.pairs, strict=True)]
+    terms = _terms_of(trial, freq)
     names = [one.name for one in terms.parameters]
     std = sizes_of(trial, gamma, freq)
     bound = np.full(len(names), np.nan)
@@ -115,7 +125,7 @@ def truth_of(trial: Trial) -> tuple[dict[str, float], dict[str, float]]:
             fold = np.eye(shared.max() + 1)[shared]
             covariance = fold @ np.linalg.inv(fold.T @ np.linalg.inv(covariance) @ fold) @ fold.T
         bound[which] = trial.level * np.sqrt(np.diag(covariance))
-    return dict(zip(names, values, strict=True)), dict(zip(names, bound.tolist(), strict=True))
+    return dict(zip(names, bound.tolist(), strict=True))
 
 
 def _groups(gamma: np.ndarray) -> list[np.ndarray]:
@@ -139,7 +149,7 @@ def row_of(trial: Trial, draws: Sequence[Draw]) -> Row:
 
     A stiffness is compared by its compliance, in which the noise is nearly normal: 1/k exists where k does not.
     """
-    truth, bound = truth_of(trial)
+    truth, bound = true_values(trial), bound_of(trial)
     refused = sum(not draw.value for draw in draws)
     draws = [draw for draw in draws if draw.value]
     ratio, usual, coverage, run_off = {}, {}, {}, np.zeros(len(draws), bool)

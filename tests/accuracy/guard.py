@@ -106,7 +106,7 @@ def _given_noise() -> jf.Fit:
     return jf.identify(freq, gamma, joint.dofs, noise=0.02)
 
 
-REMOTE, DRIVE = wrong_models.POINTS
+REMOTE, DRIVE, *_ = wrong_models.POINTS
 PROBLEMS: dict[str, Callable[[], jf.Fit]] = {
     **{trial.name: _trial(trial) for trial in (
         *(Trial(name, "complex", 0.05) for name in ("3.1", "3.2", "3.3")),

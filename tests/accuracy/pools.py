@@ -48,7 +48,7 @@ def coverage(one: RoundRobin, row: int, draws: int) -> tuple[list[float], list[f
         between = effects.variances[:, -1]
         mean = effects.combination(np.ones(1)).interval(0.95)
         ahead = effects.combination(np.ones(1), between).interval(0.95)
-        spread = np.sqrt(np.quantile(between, [0.025, 0.975]))
+        spread = np.sqrt([np.quantile(between, 0.025), effects.upper_limit(len(factors), 0.025)])
         truth = rng.normal(0, one.between)
         inside += [mean[0] <= 0 <= mean[1], spread[0] <= one.between <= spread[1], ahead[0] <= truth <= ahead[1]]
         widths.append((mean[1] - mean[0], ahead[1] - ahead[0]))

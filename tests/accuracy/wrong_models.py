@@ -23,16 +23,18 @@ FREQ = np.arange(15.0, 801.0, 4.0)
 LENGTHS, MODULUS, ELEMENTS = (0.3, 0.225), 67e9, (12, 9)
 SECTION = {"density": 2700.0, "width": 0.025, "height": 0.006, "loss_factor": 0.01}
 TRUE = {"k_y": 6e5, "c_y": 20.0, "k_theta": 5e3, "c_theta": 1.5}
-#: Channels by side and distance from the first node, in 25 mm; noise.
+_REMOTE = (("A", 6), ("A", 9), ("B", 6), ("B", 9))
+#: Responses and forces by side and distance from the first node, in 25 mm; noise.
 POINTS = {
-    "16 FRFs at remote points, 2 %": ((("A", 6), ("A", 9), ("B", 6), ("B", 9)), 0.02),
-    "one drive point, 5 %": ((("B", 9),), 0.05),
+    "16 FRFs at remote points, 2 %": (_REMOTE, _REMOTE, 0.02),
+    "one drive point, 5 %": (_REMOTE[3:], _REMOTE[3:], 0.05),
+    "4 responses, one force, 1 %": (_REMOTE, _REMOTE[3:], 0.01),
 }
 #: What is wrong with the believed models, and by what word.
 WRONG = (
     "nothing", "E of A -0.1 %", "E of A +0.3 %", "E of A -1 %", "E of A +3 %", "length of A 0.3 %", "1 g missing on A",
     "1 g missing at the end of B", "clamp of A that turns", "rotary inertia missing", "4 + 3 elements, not 12 + 9",
-    "linear elements",
+    "linear elements", "all forces +3 %", "last force +3 %", "first response +3 %",
 )  # fmt: skip
 
 
@@ -68,9 +70,18 @@ class Pair:
         """How many elements of the true beam one of the believed beam is."""
         return 3 if "not 12" in self.wrong else 1
 
-    def names(self, coarse: int = 1) -> tuple[str, ...]:
-        """Channels in the numbers of nodes."""
-        return tuple(f"{side}/{place // coarse + 1}:y" for side, place in POINTS[self.points][0])
+    def channels(self, coarse: int = 1) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Responses and forces in the numbers of nodes."""
+        named = [tuple(f"{side}/{at // coarse + 1}:y" for side, at in one) for one in POINTS[self.points][:2]]
+        return named[0], named[1]
+
+    def gains(self) -> np.ndarray:
+        """Measured over true FRFs, shape (n_o, n_i)."""
+        found = np.ones([len(one) for one in POINTS[self.points][:2]])
+        changed = {"all": ..., "last": (..., -1), "first": 0}.get(self.wrong.split()[0])
+        if changed is not None:
+            found[changed] += 0.03
+        return found
 
     def truth(self) -> jf.Assembly:
         """The assembly that is measured."""
@@ -106,14 +117,13 @@ class Pair:
 @cache
 def exact_frfs(pair: Pair) -> np.ndarray:
     """FRFs of the true assembly without noise."""
-    return pair.truth().receptance(FREQ, pair.names(), pair.names())
+    return pair.truth().receptance(FREQ, *pair.channels()) * pair.gains()
 
 
 def fitted(pair: Pair, model_error: float | None, seed: int, *, exact: bool = False) -> jf.Fit:
     """Return the fit of one draw."""
-    h = jf.pollute(exact_frfs(pair), POINTS[pair.points][1], seed=seed)
-    channels = pair.names(pair.coarse)
-    return jf.identify_model(FREQ, h, pair.believed(model_error, exact=exact), channels, channels)
+    h = jf.pollute(exact_frfs(pair), POINTS[pair.points][2], seed=seed)
+    return jf.identify_model(FREQ, h, pair.believed(model_error, exact=exact), *pair.channels(pair.coarse))
 
 
 def one_draw(pair: Pair, model_error: float | None, seed: int, *, exact: bool = False) -> tuple:
@@ -124,7 +134,7 @@ def one_draw(pair: Pair, model_error: float | None, seed: int, *, exact: bool = 
         low, high = np.array([fit.intervals.of(name, 0.95) for name in TRUE]).T
     true = np.array(list(TRUE.values()))
     codes = {one.code for one in fit.findings if one.severity == "warning"}
-    said = not codes.isdisjoint(("residual-large", "model-error", "prior-contradicted"))
+    said = not codes.isdisjoint(("residual-large", "model-error", "model-gain", "prior-contradicted"))
     return (low <= true) & (true <= high), (high - low) / (2 * true), said
 
 

@@ -12,7 +12,9 @@ const char *const routine_name[ROUTINES] = {
     "ismm", "inverse_substructuring", "decouple", "joint_compliance", "compliance_factors", "compliance_covariance",
     "transform", "central_difference", "project_on_joint", "joint_forms", "pollute", "monte_carlo", "brick_matrices",
     "brick_quality", "difference_weights", "expect_on_joint", "fit_diagonal_joint",
-    "joint_normal_equations", "rational_fit", "relocate_poles",
+    "joint_normal_equations", "rational_fit", "relocate_poles", "smooth_frfs",
+    "estimate_noise", "line_correlation", "line_levels", "noise_parts",
+    "lowest_diagonal_joint", "start_joint", "fit_joint",
 };
 /* The number of LWORK among the arguments; that of LIWORK is two more. */
 const int lwork_argument[WORK_ROUTINES] = {8, 11, 20, 22, 16, 15, 12, 10, 11, 9, 18, 9, 11, 13, 14};
@@ -98,9 +100,34 @@ void begin(const problem *p, double *out)
         memcpy(out, p->in[4], numbers * sizeof *out);
         memcpy(out + numbers, p->in[5], numbers * sizeof *out);
         break;
-    case FIT_DIAGONAL_JOINT: memcpy(out, p->in[3] + 2 * (p->in_all[3] / 3), p->in_all[3] / 3 * sizeof *out); break;
-    case RELOCATE_POLES: memcpy(out, p->in[3], p->in_all[3] * sizeof *out);
+    case FIT_DIAGONAL_JOINT: case LOWEST_DIAGONAL_JOINT:
+        memcpy(out, p->in[3] + 2 * (p->in_all[3] / 3), p->in_all[3] / 3 * sizeof *out);
+        break;
+    case RELOCATE_POLES: memcpy(out, p->in[3], p->in_all[3] * sizeof *out); break;
+    case LINE_CORRELATION: memcpy(out, p->in[0], p->in_all[0] * sizeof *out);
     }
+}
+
+/* The joint without cross terms of FRFs at the joint; results one after the other. */
+static jf_int fit_joint(const problem *p, double *out, jf_int *line_info)
+{
+    static const jf_int from_nothing = 0, patience = 4, rigid = 0;
+    const jf_int *s = p->size;
+    const size_t lines = p->n_freq > 0 ? (size_t)p->n_freq : 0, n = (size_t)(s[0] > 0 ? s[0] : 0);
+    const size_t n_par = (size_t)(s[1] > 0 ? s[1] : 0), square = n_par * n_par;
+    jf_complex *h = (jf_complex *)out, *q = h + n * n * lines, *c = q + n * n * lines, *w = c + n * lines;
+    jf_complex *g = w + n * n * lines;
+    double *descents = (double *)(g + n * lines), *distance = descents + n_par * lines, *squares = distance + lines;
+    double *spring = squares + lines, *x = spring + n, *values = x + n_par, *descent = values + n_par;
+    double *covariance = descent + n_par, *normal = covariance + square, *numbers = normal + square;
+    jf_int iterations, converged, info = 12345;
+
+    jf_fit_joint(&p->trans, &p->flag, s, s + 1, s + 3, s + 4, s + 2, &p->n_freq, &from_nothing, &patience, &rigid,
+                 &p->number, p->dofs[0], p->dofs[1], p->in[4], (const jf_complex *)p->in[0],
+                 (const jf_complex *)p->in[3], p->in[1], p->in[2], spring, x, h, q, values, covariance, normal, descent,
+                 numbers, numbers + 1, descents, distance, line_info + lines, c, w, g, squares, &iterations, &converged,
+                 line_info, &info);
+    return info;
 }
 
 jf_int call(const problem *p, const workspace *w, double *out, jf_int *line_info, double *rcond)
@@ -114,7 +141,9 @@ jf_int call(const problem *p, const workspace *w, double *out, jf_int *line_info
     double *const *in = p->in;
     jf_complex *h = (jf_complex *)out;
     const size_t part = p->in_all[3] / 3;
-    jf_int info = 12345;
+    const double found = 0.0, unit = 1.0;
+    double found_squares, *const rest = out + p->out_line * lines;
+    jf_int info = 12345, n_found;
 
     begin(p, out);
     switch (p->routine) {
@@ -186,6 +215,37 @@ jf_int call(const problem *p, const workspace *w, double *out, jf_int *line_info
         break;
     case RELOCATE_POLES:
         jf_relocate_poles(s, s + 1, n_freq, s + 3, &p->number, a, b, in[2], h, out + p->in_all[3], &info);
+        break;
+    case SMOOTH_FRFS:
+        jf_smooth_frfs(s + 1, n_freq, s, s + 2, s + 3, &found, in[0], b, in[2], (jf_complex *)(out + p->out_line * lines),
+                       &n_found, h, &found_squares, &info);
+        if (info >= 0)
+            out[p->out_line * lines + 2 * (size_t)s[0]] = n_found + found_squares;
+        break;
+    case ESTIMATE_NOISE:
+        jf_estimate_noise(s, n_freq, &one, &p->flag, in[0], b, c, in[3], in[4], &one, s, &unit, rest, out,
+                          out + (size_t)s[0] * lines, out + (size_t)(s[0] + 1) * lines, &n_found, &found_squares, &info);
+        if (info >= 0)
+            rest[3 * s[0]] = n_found + found_squares;
+        break;
+    case LINE_CORRELATION:
+        jf_line_correlation(s, n_freq, h, &p->number, &found_squares, &info);
+        if (info >= 0)
+            rest[0] = found_squares;
+        break;
+    case LINE_LEVELS: jf_line_levels(s, n_freq, a, &unit, &p->flag, out, out + lines, &info); break;
+    case NOISE_PARTS: jf_noise_parts("L", s + 1, s, n_freq, in[0], in[1], rest, &info);
+        break;
+    case LOWEST_DIAGONAL_JOINT:
+        jf_lowest_diagonal_joint(t, &p->flag, s, s + 1, n_freq, s + 3, &none, &p->number, p->dofs[0], p->dofs[1], in[3],
+                                 in[3] + part, in[0], b, c, (jf_complex *)in[4], in[5], out, out + part,
+                                 out + part + part * part, out + 2 * part + part * part, &info);
+        break;
+    case START_JOINT:
+        jf_start_joint(t, &p->flag, s, s + 1, s + 3, s + 4, n_freq, p->dofs[0], p->dofs[1], in[4], in[5], a, in[1], out,
+                       out + (s[1] > 0 ? s[1] : 0), &info);
+        break;
+    case FIT_JOINT: info = fit_joint(p, out, line_info);
     }
     return info;
 }

@@ -12,8 +12,9 @@ int variants(int routine)
 {
     switch (routine) {
     case RECEPTANCE: case RECEPTANCE_BANDED: case DECOUPLE: case PROJECT_ON_JOINT: case JOINT_FORMS:
-    case EXPECT_ON_JOINT: return 4;
-    case COMPLIANCE_COVARIANCE: case FIT_DIAGONAL_JOINT: return 2;
+    case EXPECT_ON_JOINT: case FIT_JOINT: return 4;
+    case COMPLIANCE_COVARIANCE: case FIT_DIAGONAL_JOINT: case ESTIMATE_NOISE: case LINE_LEVELS: return 2;
+    case LOWEST_DIAGONAL_JOINT: case START_JOINT: return 2;
     case POLLUTE: return sizeof noises - 1;
     case MONTE_CARLO: case BRICK_MATRICES: return 3;
     default: return 1;
@@ -262,7 +263,7 @@ problem new_problem(int routine, char trans, int n, int n_freq, int variant)
             lines(&p, i, n, n, &state);
         p.out_line = 4 * (size_t)(n * n);
         break;
-    case FIT_DIAGONAL_JOINT:
+    case FIT_DIAGONAL_JOINT: case LOWEST_DIAGONAL_JOINT:
         p.size[1] = joint;
         p.size[3] = 5;
         for (i = 0; i < joint; i++) {
@@ -312,6 +313,65 @@ problem new_problem(int routine, char trans, int n, int n_freq, int variant)
             p.in[3][2 * i + 1] = 1.0 + (i + 0.5) / n;
         }
         p.out_line = 6;
+        break;
+    case SMOOTH_FRFS:
+        p.size[1] = 3;
+        p.size[2] = 0;
+        p.size[3] = 2;
+        numbers(&p, 0, 1, 0, &state);
+        for (i = 0; i < n_freq; i++)
+            p.in[0][i] = 10.0 + i;
+        lines(&p, 1, 3, 1, &state);
+        numbers(&p, 2, 3, 0, &state);
+        for (i = 0; i < (int)p.in_all[2]; i++)
+            p.in[2][i] = 2.0 + p.in[2][i];
+        p.out_line = 6;
+        break;
+    case ESTIMATE_NOISE:
+        frequencies(&p, &state);
+        lines(&p, 1, n, 1, &state);
+        lines(&p, 2, n, 1, &state);
+        numbers(&p, 3, 0, (size_t)n, &state);
+        numbers(&p, 4, (size_t)n, 0, &state);
+        for (k = 3; k <= 4; k++)
+            for (i = 0; i < (int)p.in_all[k]; i++)
+                p.in[k][i] = fabs(p.in[k][i]);
+        p.out_line = (size_t)n + 2;
+        break;
+    case LINE_CORRELATION: case LINE_LEVELS:
+        lines(&p, 0, n, 1, &state);
+        p.out_line = routine == LINE_LEVELS ? 2 : 2 * (size_t)n;
+        break;
+    case NOISE_PARTS:
+        p.size[1] = 2;
+        numbers(&p, 0, (size_t)n, 0, &state);
+        numbers(&p, 1, 2 * (size_t)n, 0, &state);
+        for (k = 0; k < 2; k++)
+            for (i = 0; i < (int)p.in_all[k]; i++)
+                p.in[k][i] = fabs(p.in[k][i]);
+        p.out_line = 1;
+        break;
+    case START_JOINT: case FIT_JOINT:
+        p.size[1] = n + 1;
+        p.size[3] = p.size[4] = joint;
+        p.size[2] = variant & 2 ? p.flag ? n * (joint + 1) : joint * joint : 0;
+        for (i = 0; i <= n; i++) {
+            p.dofs[0][i] = 1 + i % (n > 0 ? n : 1);
+            p.dofs[1][i] = i == n ? 2 : 0;
+        }
+        regular(&p, 0, joint, &state);
+        numbers(&p, 1, (size_t)joint * (size_t)joint, 0, &state);
+        for (i = 0; i < (int)p.in_all[1]; i++)
+            p.in[1][i] = 2.0 + p.in[1][i];
+        numbers(&p, 2, (size_t)p.size[2] * (size_t)p.size[2], 0, &state);
+        regular(&p, 3, joint, &state);
+        numbers(&p, 4, 1, 0, &state);
+        numbers(&p, 5, 0, (size_t)n, &state);
+        for (i = 0; i < n; i++)
+            p.in[5][i] = 2.0 + p.in[5][i];
+        /* Results by line, and those of all lines. */
+        p.out_line = 6 * (size_t)(n * n) + 5 * (size_t)n + 3;
+        p.out_line += 2 * (size_t)((n + 1) * (n + 1)) + 4 * (size_t)n + 5;
     }
     return p;
 }
@@ -354,6 +414,8 @@ void spoil(problem *p, int line, char how)
     int k;
     size_t i;
 
+    if (p->routine >= SMOOTH_FRFS)      /* refuses all lines where one is wrong */
+        return;
     for (k = 0; k < inputs; k++) {
         double *a = p->in[k] + p->in_line[k] * (size_t)line;
 

@@ -115,7 +115,7 @@ static jf_int call(void)
     double *rcond = out[1];
     const jf_int part = any_part(MOST), n_damping = next(3) ? (int)next(2) * n : any_part(MOST);
     const jf_int n_structural = next(3) ? (int)next(2) * n : any_part(MOST), kl = next(40) ? flag : INT_MAX;
-    const int routine = (int)next(27);
+    const int routine = (int)next(31);
     const jf_int few = any_size(2), order = few > 0 ? few : 1;
     const jf_int n_free = next(20) ? flag == 1 ? order * (order + 1) / 2 : order * order : m;
     const jf_int n_correlated = next(3) ? 0 : next(9) ? flag == 1 ? order * (2 * order + 1) : 4 * order * order : m;
@@ -198,6 +198,22 @@ static jf_int call(void)
                                   out[0], out[1], &info);
         break;
     }
+    case 26: {
+        jf_int n_found;
+
+        jf_smooth_frfs(&m, &n_freq, &n, &q, &p, &number, in[0], frf(1), in[2], h, &n_found, second, squares, &info);
+        break;
+    }
+    case 27: {
+        jf_int is_shaped;
+
+        jf_estimate_noise(&m, &n_freq, &p, &flag, in[0], frf(1), frf(2), in[3], in[4], dofs[0], dofs[1], &number, out[0],
+                          out[1], out[0] + 100, out[0] + 200, &is_shaped, squares, &info);
+        break;
+    }
+    case 28: jf_line_correlation(&m, &n_freq, h, &number, squares, &info); break;
+    case 29: jf_line_levels(&m, &n_freq, frf(0), &number, &flag, out[0], out[1], &info); break;
+    case 30: jf_noise_parts(&t, &n, &m, &n_freq, in[0], in[1], out[0], &info); break;
     default: jf_brick_quality(&n_freq, in[0], out[0], out[1], &info);
     }
     return info;

@@ -71,7 +71,7 @@ static void new_tasks(void)
     n_tasks = 0;
     for (routine = 0; routine < ROUTINES; routine++)
         for (i = 0; i < (routine == COMPLIANCE_COVARIANCE || routine == MONTE_CARLO || routine == PROJECT_ON_JOINT
-                         || routine == JOINT_FORMS || routine == EXPECT_ON_JOINT ? 1 : 3); i++) {
+                         || routine == JOINT_FORMS || routine == EXPECT_ON_JOINT || routine == FIT_JOINT ? 1 : 3); i++) {
             new_task(routine, orders[i], 0);
             if (routine < WORK_ROUTINES)
                 new_task(routine, orders[i], 1);

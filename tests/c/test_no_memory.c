@@ -255,7 +255,7 @@ static int too_large(int routine, int n)
 {
     switch (routine) {
     case BRICK_MATRICES: case BRICK_QUALITY: return n > 1;
-    case PROJECT_ON_JOINT: case JOINT_FORMS: case EXPECT_ON_JOINT: return n > 3;
+    case PROJECT_ON_JOINT: case JOINT_FORMS: case EXPECT_ON_JOINT: case FIT_JOINT: return n > 3;
     case COMPLIANCE_COVARIANCE: return n > 5;
     case MONTE_CARLO: return n > 40;
     default: return 0;
@@ -288,7 +288,7 @@ static void *without_threads(void *engine)
 
     for (routine = 0; routine < ROUTINES; routine++) {
         const int small = routine == COMPLIANCE_COVARIANCE || routine == MONTE_CARLO || routine == PROJECT_ON_JOINT
-                          || routine == JOINT_FORMS || routine == EXPECT_ON_JOINT;
+                          || routine == JOINT_FORMS || routine == EXPECT_ON_JOINT || routine == FIT_JOINT;
         problem p = new_problem(routine, 'N', small ? 3 : 9, 500, 0);
         outcome o = new_outcome(&p), expected = new_outcome(&p);
         const int threads = omp_get_max_threads();

@@ -48,10 +48,11 @@ static int too_large(int routine, int n)
 {
     switch (routine) {
     case BRICK_MATRICES: case BRICK_QUALITY: return n > 2;
-    case PROJECT_ON_JOINT: case JOINT_FORMS: case EXPECT_ON_JOINT: return n > 3;
+    case PROJECT_ON_JOINT: case JOINT_FORMS: case EXPECT_ON_JOINT: case FIT_JOINT: return n > 3;
     case COMPLIANCE_COVARIANCE: case JOINT_NORMAL_EQUATIONS: return n > 8;
     case MONTE_CARLO: return n > 33;
-    case FIT_DIAGONAL_JOINT: case RATIONAL_FIT: case RELOCATE_POLES: return n > 64;
+    case FIT_DIAGONAL_JOINT: case LOWEST_DIAGONAL_JOINT: case RATIONAL_FIT: case RELOCATE_POLES: case SMOOTH_FRFS:
+        return n > 64;
     default: return 0;
     }
 }

@@ -192,7 +192,7 @@ static int too_many(int routine, int n, jf_int engine)
 {
     switch (routine) {
     case BRICK_MATRICES: case BRICK_QUALITY: return n > 2 || engine != JF_ENGINE_LAPACK;
-    case PROJECT_ON_JOINT: case JOINT_FORMS: case EXPECT_ON_JOINT: return n > 3;
+    case PROJECT_ON_JOINT: case JOINT_FORMS: case EXPECT_ON_JOINT: case FIT_JOINT: return n > 3;
     case POLLUTE: case MONTE_CARLO: return n > 2;
     case COMPLIANCE_COVARIANCE: return n > 5;
     case DECOUPLE: return n > 8;
@@ -262,7 +262,7 @@ static void workers(jf_int engine)
     for (routine = 0; routine < ROUTINES; routine++)
         for (variant = 0; variant < variants(routine); variant += 3) {
             const int large = routine == COMPLIANCE_COVARIANCE || routine == MONTE_CARLO || routine == PROJECT_ON_JOINT
-                              || routine == JOINT_FORMS || routine == EXPECT_ON_JOINT;
+                              || routine == JOINT_FORMS || routine == EXPECT_ON_JOINT || routine == FIT_JOINT;
             const int n = large ? 3 : 9;
             problem p = new_problem(routine, 'N', n, MANY_LINES, variant);
             outcome expected = new_outcome(&p), o = new_outcome(&p);

@@ -228,10 +228,10 @@ contains
     s = make_sample(n, reciprocal, correlated, spring)
     s%w = 1.0e4_dp*s%w
     allocate (information(s%n_free, s%n_free, lines), gradient(s%n_free, lines, 1))
-    call joint_forms(.false., reciprocal, reshape(s%gamma, [2*n, 2*n, lines, 1]), s%w, s%whitening, &
-        s%c, s%h, s%m, &
-                     information, gradient, left, line_info, info, s%spring)
+    call joint_forms(.false., reciprocal, .false., reshape(s%gamma, [2*n, 2*n, lines, 1]), s%w, s%whitening, &
+                     s%c, s%h, s%m, information, gradient, left, line_info, info, s%spring)
     call check(info == 0 .and. all(line_info == 0), 'forms: good')
+    call by_diagonal(s, information)
     call check(all(left < 1.0e-12_dp), 'forms: no distance')
     d = 1.0e-6_dp*square(s)
     s%c = s%c + d
@@ -250,6 +250,22 @@ contains
       call check(abs(squares(i) - cost) < 1.0e-3_dp*cost + 1.0e-6_dp, 'the cost of another joint')
     end do
   end subroutine other_joint
+
+  !> Forms of the diagonal of R alone are parts of those of all its entries.
+  subroutine by_diagonal(s, information)
+    type(sample), intent(in) :: s
+    complex(dp), intent(in) :: information(:, :, :)
+    complex(dp) :: own(s%n, s%n, lines), gradient(s%n, lines, 1), part(s%n, s%n, lines)
+    real(dp) :: left(lines, 1)
+    integer(ip) :: line_info(lines), info
+    integer :: a, at(s%n)
+
+    at = [(merge(((a - 1)*(2*s%n - a + 2))/2 + 1, (a - 1)*s%n + a, s%reciprocal), a=1, s%n)]
+    call joint_forms(.false., s%reciprocal, .true., reshape(s%gamma, [2*s%n, 2*s%n, lines, 1]), s%w, s%whitening, &
+                     s%c, s%h, s%m, own, gradient, left, line_info, info, s%spring)
+    part = information(at, at, :)
+    call check_close(own, part, 1.0e-10_dp, 'forms of the diagonal')
+  end subroutine by_diagonal
 
   !> Expected H and M minimise squares of M over its deviations and of the linear change of the FRFs over their error:
   !> no other step is lower. A line that holds NaN is NaN.
@@ -435,15 +451,16 @@ contains
     do i = 1, 2
       targets_t(:, :, :, i) = transposed(targets(:, :, :, i))
     end do
-    call joint_forms(.false., reciprocal, targets, s%w, s%whitening, s%c, h, m, w, p, left, line_info, info, s%spring)
-    call joint_forms(.true., reciprocal, targets_t, weights_t, factor_t, transposed(s%c), h_t, m_t, &
+    call joint_forms(.false., reciprocal, .false., targets, s%w, s%whitening, s%c, h, m, w, p, left, line_info, info, &
+                     s%spring)
+    call joint_forms(.true., reciprocal, .false., targets_t, weights_t, factor_t, transposed(s%c), h_t, m_t, &
         w_t, p_t, left_t, &
                      line_info, info, s%spring)
     call check_same(transposed(w_t), w, 'W, transposed')
     call check_close(w, conjg(transposed(w)), 0.0_dp, 'W is Hermitian')
     call check_same(p_t, p, 'gradients do not depend on the order of storage')
     call check_same(left_t(:, 2), left(:, 2), 'squares of the second target')
-    call joint_forms(.false., reciprocal, targets(:, :, :, 2:2), s%w, s%whitening, s%c, h, m, w_t, &
+    call joint_forms(.false., reciprocal, .false., targets(:, :, :, 2:2), s%w, s%whitening, s%c, h, m, w_t, &
         p_t(:, :, :1), &
                      left_t(:, :1), line_info, info, s%spring)
     call check_close(p_t(:, :, 1:1), p(:, :, 2:2), 1.0e-10_dp, 'a target alone')
@@ -487,7 +504,7 @@ contains
     end do
     m = s%m
     m(:, :, 17) = 1.0e200_dp
-    call joint_forms(.false., .true., reshape(s%gamma, [2*n, 2*n, lines, 1]), s%w, s%whitening, s%c, &
+    call joint_forms(.false., .true., .false., reshape(s%gamma, [2*n, 2*n, lines, 1]), s%w, s%whitening, s%c, &
         s%h, m, w, p, &
                      left, line_info, info, s%spring)
     call check(info == 5 .and. all(line_info == expected), 'bad forms')
@@ -553,7 +570,7 @@ contains
                           line_info, info, [real(dp) ::])
     call check(info == 0, 'no lines')
     info = 5
-    call joint_forms(.true., .true., reshape(gamma, [2, 2, 0, 1]), weights, factor, a, a, a, w, p, &
+    call joint_forms(.true., .true., .false., reshape(gamma, [2, 2, 0, 1]), weights, factor, a, a, a, w, p, &
                      left, line_info, info, [real(dp) ::])
     call check(info == 0, 'no lines, forms')
   end subroutine nothing

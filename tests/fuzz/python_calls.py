@@ -26,7 +26,8 @@ import numpy as np
 from scipy import sparse
 
 import jointfrf as jf
-from jointfrf.io.cards import CardFormat, CardOptions
+from jointfrf.io.card_link import CardFormat
+from jointfrf.io.cards import CardOptions
 
 from .part import BrokenError
 from .sound import sound_arguments

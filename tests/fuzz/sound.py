@@ -117,8 +117,21 @@ def _structures() -> dict[str, dict[str, Any]]:
     k, m = np.diag([3.0, 4.0, 5.0]), np.eye(3)
     substructures = [jf.Substructure(model, (dof,)) for model, dof in ((c["a"], "2:x"), (c["b"], "1:x"))]
     law = jf.LawJoint({"x": jf.SpringLaw(2000.0, 3.0)})
+    corners = {"1": [0.0, 0.0, 0.0], "2": [0.2, 0.0, 0.0], "3": [0.0, 0.2, 0.0], "4": [0.2, 0.2, 0.0]}
+    square = jf.PointModel(
+        np.zeros((4, 4)), np.eye(4), [f"{node}:z" for node in corners],
+        places={node: np.array(place) for node, place in corners.items()},
+    )  # fmt: skip
     return {
         "chain": {"masses": [5, 3], "stiffness": [2500, 3500], "damping": [3, 4]},
+        "plate": {
+            "length": 0.2, "width": 0.1, "thickness": 0.002, "youngs_modulus": 210e9, "density": 7850.0,
+            "elements": (2, [0.0, 0.04, 0.1]), "edges": ("clamped", "free", "free", "supported"),
+            "points": {"tip": [0.15, 0.05]}, "regions": {"weld": jf.PlateRegion((0.0, 0.0), (0.2, 0.0), 2)},
+        },
+        "NodeRegion": {"name": "base", "nodes": ["1", "2", "3", "4"], "degree": 1, "size": 0.04},
+        "add_regions": {"model": square, "regions": [jf.NodeRegion("base", list(square.places), degree=1)]},
+        "with_modal_damping": {"model": c["a"], "ratios": [0.01, 0.02]},
         "rigid_body": {"mass": 2.0, "inertia": [0.1, 0.1, 0.2], "points": {"edge": [0.5, 0.0, 0.0]}},
         "beam": dict(length=0.3, n_elements=3, youngs_modulus=67e9, density=2700.0, width=0.025, height=0.006),
         "Model": {"stiffness": k, "mass": m, "dofs": ("1:x", "2:x", "3:x"), "damping": 0.1 * k},
@@ -186,6 +199,9 @@ def _identification(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     mean = {"freq_hz": freq, "measured": gamma, "dofs": ["x"], "bands": (1.0, 9.0)}
     first = c["first"].dynamic_stiffness(freq)
     found = jf.identify(freq, gamma, ["x"], noise=0.01)
+    time = np.arange(2000) / 50
+    ringing = np.exp(-0.05 * time) * np.cos(20 * time) + 1e-4 * np.random.default_rng(1).normal(size=time.size)
+    decay = jf.DecayRecord(time, ringing[:, None], ["A/1:x"], "displacement")
     again = jf.identify(freq, jf.pollute(c["gamma"], 0.01, seed=2), ["x"], noise=0.01)
     cross = jf.Joint([[6e5, 5e3], [5e3, 5e3]], dofs=["y", "rz"])
     return {
@@ -239,6 +255,14 @@ def _identification(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         "backbone_levels": {
             "whole": assembly, "backbone": jf.Backbone("A/1:x", [2.0, 1.9], [1e-3, 2e-3], damping=[0.01, 0.02]),
             "dof": "x", "laws": ["constant"], "probability": 0.9,
+        },
+        "DecayRecord": {
+            "time": decay.time, "signals": decay.signals, "sensors": ["A/1:x"], "motion": "displacement",
+        },
+        "decay_of_mode": {"record": decay, "freq_hz": 3.2, "bandwidth": 2.0, "start": 1.0, "ratio": 1.4},
+        "decay_levels": {
+            "whole": assembly, "decays": jf.decay_of_mode(decay, 3.2), "channels": {"A/1:x": "A/1:x"}, "dof": "x",
+            "errors": (0.01, 0.02), "laws": ["constant"], "probability": 0.9,
         },
         "write_levels": {"found": jf.levels([found], [jf.Drive("joint", 1e-3, "x")]), "path": "levels.html"},
         "pool": {"fits": [found, again], "common": 0.01, "parameters": ["k_x"], "probability": 0.9},
@@ -336,10 +360,28 @@ def _files(folder: Path) -> dict[str, dict[str, Any]]:
     law = jf.LawJoint({"x": jf.SpringLaw(2000.0, 3.0)})
     jf.write_joint(folder / "joint.toml", law)
     first = jf.study("3.1", folder / "study", 2, design=jf.StudyDesign(estimators=["ismm"]), jobs=1)
-    written = {name: {"path": folder / f"out.{name}", "frfs": frfs} for name in ("uff", "npz", "csv", "hdf5")}
+    written = {name: {"path": folder / f"out.{name}", "frfs": frfs} for name in ("uff", "npz", "csv", "hdf5", "mat")}
+    (folder / "time.csv").write_text("time [s],A/1:x [m/s^2]\n0.0,1.0\n0.1,0.5\n0.2,0.25\n")
+    row = {"Grouping": 1, "Position_1": 10.0, "Position_2": 0.0, "Position_3": 0.0}
+    table = [row | {f"Direction_{i}": float(i == axis) for i in (1, 2, 3)} for axis in (1, 2)]
     return {
         "read_uff": {"path": folder / "a.uff"},
         "read_frfs": {"paths": folder / "a.npz"},
+        "read_time_record": {"path": folder / "time.csv", "rate": 10.0, "unit": "g"},
+        "from_pyfbs": {
+            "test": frfs.freq_hz,
+            "frf": h,
+            "df_chn": table,
+            "df_imp": table,
+            "unit": "m/s^2/N",
+            "position_unit": "mm",
+            "sides": {1: "j"},
+            "coherence": np.full(h.shape, 0.9),
+        },
+        "from_sdynpy": {"array": jf.io.to_sdynpy(frfs), "unit": "m/N"},
+        "to_sdynpy": {"frfs": frfs},
+        "from_escdf": {"dataset": jf.io.to_escdf(frfs)},
+        "to_escdf": {"frfs": frfs},
         "measured_assembly": {"path": folder / "assembly.toml", "frfs": frfs},
         "read_channel_table": {"path": folder / "table.csv"},
         "read_joint": {"path": folder / "joint.toml"},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -13,6 +14,7 @@ from pathlib import Path
 
 from .configurations import Configuration, configurations
 from .environments import FOLDER, ROOT, NotMadeError, make_environment, make_programs
+from .machines import MACHINES
 
 ABOUT = """\
 Runs the numerical tests in many configurations, each a row of a table: kinds of processor for which OpenBLAS has
@@ -21,7 +23,13 @@ pyproject.toml takes, and every Python. Numerical tests are all of tests/run but
 and those of files in which no number depends on how it is computed (packaging, warnings, plots, texts of cases, files,
 cards). Rows called `programs` are the test programs of the kernel. Environments and logs are kept in build/portability.
 What a machine does not have is `not here`; PORTABILITY_PYTHONS names further interpreters, as PATH names folders.
-"""
+
+Rows of other machines compile with a cross compiler and run in an emulator: the test programs, and the tests named in
+tests/portability/numerical.py on a wheel. They need packages of Debian; the last ones also need Maven, or
+PORTABILITY_WINDOWS_PYTHON, the folder of a Python for Windows with its headers:
+{packages}
+""".format(packages="\n".join(f"  {each.name}: {' '.join(each.packages)}" for each in MACHINES))
+NUMERICAL = Path(__file__).with_name("numerical.py")
 WITHOUT = ("packaging", "warnings", "plots", "cases_output", "cases_file", "files", "cards")
 
 
@@ -57,9 +65,15 @@ def run(row: Configuration, jobs: int) -> Count:
     started = time.monotonic()
     try:
         if row.runner == "programs":
-            junit = make_programs() / "meson-logs" / "testlog.junit.xml"
+            build = row.machine.make_programs() if row.machine else make_programs()
+            junit = build / "meson-logs" / "testlog.junit.xml"
             junit.unlink(missing_ok=True)
-            command = ["meson", "test", "-C", str(junit.parents[1]), "--no-rebuild", "--num-processes", str(jobs)]
+            command = ["meson", "test", "-C", str(build), "--no-rebuild", "--num-processes", str(jobs)]
+            # An emulator takes its time.
+            command += ["--suite", "two threads", "--timeout-multiplier", "5"] if row.machine else []
+        elif row.machine:
+            command = [*map(str, row.machine.make_package()), row.machine.foreign(NUMERICAL)]
+            command.append(f"--junitxml={row.machine.foreign(junit)}")
         else:
             programs = make_environment(row.python, row.versions) if row.python else Path(sys.executable).parent
             # The editable installation brings itself up to date here, and not in several processes at once.
@@ -71,9 +85,11 @@ def run(row: Configuration, jobs: int) -> Count:
         log.write_text(f"{error}\n{getattr(error, 'stderr', '')}\n")
         return Count(0, 1, 0, time.monotonic() - started)
     started = time.monotonic()
-    with log.open("w") as output:
-        environment = os.environ | row.variables
-        done = subprocess.run(command, cwd=ROOT, env=environment, stdout=output, stderr=subprocess.STDOUT, check=False)
+    environment = os.environ | row.variables | (row.machine.variables() if row.machine else {})
+    through = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    # By a pipe: a program in wine takes no file for its output.
+    with log.open("wb") as output, subprocess.Popen(command, cwd=ROOT, env=environment, **through) as done:
+        shutil.copyfileobj(done.stdout, output)
     return count(junit, done.returncode, time.monotonic() - started)
 
 

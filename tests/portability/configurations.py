@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from .environments import OLDEST, VERSIONS, find_python
+from .machines import MACHINES, Machine
 
 Runner = Literal["pytest", "programs"]
 Versions = Literal["checked-in", "lowest", "newest"]
@@ -42,7 +43,7 @@ print(json.dumps([name for name in __cpu_dispatch__ if __cpu_features__[name]]))
 class Configuration:
     """A row: tests of the package (pytest) or the test programs of the kernel, and the variables that they run with.
 
-    `python` is None for the environment of tests/run.
+    `python` is None for the environment of tests/run, `machine` for the one that this runs on.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Configuration:
     versions: Versions = "checked-in"
     variables: dict[str, str] = field(default_factory=dict)
     is_here: bool = True
+    machine: Machine | None = None
 
 
 def _said(script: str, **variables: str) -> str:
@@ -88,3 +90,7 @@ def configurations() -> Iterator[Configuration]:
         for versions in ("checked-in", "newest"):
             name = f"Python {python}, {versions} versions"
             yield Configuration(name, python=python, versions=versions, is_here=bool(find_python(python)))
+    for machine in MACHINES:
+        for runner in get_args(Runner):
+            name = f"{machine.name}, {'programs' if runner == 'programs' else 'package'}"
+            yield Configuration(name, runner, is_here=machine.is_here, machine=machine)

@@ -245,11 +245,11 @@ def test_a_kind_is_added_by_a_folder_and_a_line(tmp_path):
     package = shutil.copytree(Path(jf.__file__).parent, tmp_path / "jointfrf", ignore=shutil.ignore_patterns("*.pyc"))
     (package / "cases" / "pendulum").mkdir()
     (package / "cases" / "pendulum" / "__init__.py").write_text(ADDED)
-    catalogue = package / "cases" / "catalogue.py"
-    line = '    "modelled-joint",\n'
-    text = catalogue.read_text()
-    assert text.count(line) == 1
-    catalogue.write_text(text.replace(line, f'{line}    "pendulum",\n'))
+    words = package / "choices.py"
+    last = '"modelled-joint")\n'
+    text = words.read_text()
+    assert text.count(last) == 1
+    words.write_text(text.replace(last, '"modelled-joint", "pendulum")\n'))
     program = (
         "import importlib.util, sys; sys.path.insert(0, sys.argv.pop(1)); "
         "sys.meta_path = [one for one in sys.meta_path if 'editable' not in type(one).__module__]; "

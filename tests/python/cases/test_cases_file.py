@@ -74,7 +74,7 @@ CHANGES = [
         r"\[\[joint\]\] number 1: motion must be 'translation', as the name 'x' states, not 'rotation'",
     ),
     ("damping = 3.0", "damping = -3.0", r"damping must be a number, at least 0, not -3.0"),
-    ('model = "chain"', 'model = "plate"', r"model must be one of chain, beam, brick-beam, .*, not 'plate'"),
+    ('model = "chain"', 'model = "shell"', r"model must be one of chain, beam, plate, brick-beam, .*, not 'shell'"),
     ("[study]", "[study", r"not a TOML file"),
 ]
 

@@ -150,11 +150,6 @@ def test_the_report_is_written_where_it_is_asked_for(tmp_path):
     assert [path.name for path in page.parent.iterdir()] == ["customer.html"]
     result = run(BARS, *JOINT_OF_BARS, "--method", "inverse-substructuring", "--report", page, expect=2)
     assert "--report needs method compliance" in result.stderr
-    assert "--space needs a page" in run(BARS, *JOINT_OF_BARS, "--space", expect=2).stderr
-    assert "data-content" not in text
-    pytest.importorskip("plotly")
-    run(BARS, *JOINT_OF_BARS, "--report", page, "--space")
-    assert "data-content" in page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Words of the command line: what was meant, the project's own file, JSON and quiet, completion, exit codes."""
 
 import contextlib
+import io
 import json
 import os
 import re
@@ -36,6 +37,15 @@ JOINT = ["--j", "101,102", "--k", "201,202", "--dofs", "y,rz", "--band", "20:150
 def _elsewhere(tmp_path, monkeypatch):
     """Where there is no jointfrf.toml but that of the test."""
     monkeypatch.chdir(tmp_path)
+
+
+def test_a_pipe_that_lacks_a_character_gets_its_number(tmp_path, monkeypatch):
+    """As on Windows, where the encoding of a pipe is that of the country."""
+    pipe = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr(sys, "stdout", pipe)
+    assert main(["new", "known-joint", "ma\N{GREEK SMALL LETTER OMEGA}"]) == 0
+    assert rb"ma\u03c9" in pipe.buffer.getvalue()
+    assert (tmp_path / "ma\N{GREEK SMALL LETTER OMEGA}" / "case.toml").is_file()
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ from assembly_keys import assembly_page
 from documents import DOCUMENTS, ROOT, agree, blocks, follow, steps
 from harmonic_balance import Sliders, iwan_beam
 from jointfrf.assembly_file.keys import AssemblyKeys
+from jointfrf.assembly_file.read import read_assembly_file
 from jointfrf.cli.main import main
 from jointfrf.toml.declared import read_keys
 from jointfrf.toml.table import TomlTable
@@ -145,7 +146,7 @@ def test_python_of_the_page_on_fits_with_models_prints_what_it_shows(capsys):
 @pytest.mark.long
 def test_the_page_on_levels_finds_the_joint_it_was_made_of(capsys, monkeypatch):
     page = DOCUMENTS["docs/levels.md"]
-    (example,), (command, _, shown) = blocks("python", page), blocks("text", page)
+    (example,), (command, *_, shown) = blocks("python", page), blocks("text", page)
     words, expected = command.removeprefix("$ jointfrf ").split("\n", 1)
     monkeypatch.chdir(ROOT)
     assert main(words.split()) == 0
@@ -163,6 +164,14 @@ def test_the_page_on_levels_finds_the_joint_it_was_made_of(capsys, monkeypatch):
     assert best.law == "iwan"
     for name, true in {"slip_force": 3.0, "k": 1e6, "chi": -0.4, "beta": 0.8, "loss_factor": 0.004}.items():
         assert best.intervals[name][0] < true < best.intervals[name][1]
+
+
+def test_the_page_on_levels_reads_a_free_decay(capsys, monkeypatch):
+    (shown,) = [each for each in blocks("text", DOCUMENTS["docs/levels.md"]) if "--decay" in each]
+    command, expected = shown.removeprefix("$ jointfrf ").split("\n", 1)
+    monkeypatch.chdir(ROOT)
+    assert main(command.split()) == 0
+    agree(capsys.readouterr().out.split("parameter of iwan")[0], expected)
 
 
 def test_the_page_on_levels_shows_the_warning_about_amplitude(capsys, tmp_path):
@@ -248,12 +257,14 @@ OWN_TESTS = {
     ("docs/cases.md", "sh"): 1,
     ("docs/cases.md", "toml"): 1,
     ("docs/command-line.md", "toml"): 1,
-    ("docs/embedding.md", "fortran"): 2,
+    ("docs/embedding.md", "fortran"): 3,
     ("docs/engine.md", "python"): 1,
     ("docs/files.md", "python"): 2,
+    ("docs/julia.md", "julia"): 1,  # test_neighbours.py
     ("docs/levels.md", "python"): 1,
+    ("docs/matlab.md", "matlab"): 3,
     ("docs/model-fit.md", "python"): 4,
-    ("docs/model-fit.md", "toml"): 2,
+    ("docs/model-fit.md", "toml"): 3,
     ("docs/planning.md", "python"): 2,
     ("docs/python.md", "python"): 2,
     ("docs/tutorial.md", "sh"): 4,
@@ -429,10 +440,22 @@ def test_calls_in_fixed_form_fit_its_lines_and_compile(tmp_path):
     """Beyond column 72 fixed form reads nothing, and what is left of a call is none."""
     found = blocks("fortran", DOCUMENTS["docs/embedding.md"])
     calls = [text for text in found if text.startswith("      CALL")]
-    assert len(calls) == 2
+    assert len(calls) == 3
     for text in calls:
         assert max(map(len, text.splitlines())) <= 72
         (tmp_path / "call.f").write_text(f"      SUBROUTINE HOST\n{text.rstrip()}\n      END\n")
         words = ["gfortran", "-fsyntax-only", "-Wall", "-Werror=line-truncation", "call.f"]
         said = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=100)
         assert said.returncode == 0, said.stderr
+
+
+def test_plate_with_a_line_joint_is_an_assembly(tmp_path):
+    (content,) = [text for text in blocks("toml", DOCUMENTS["docs/model-fit.md"]) if 'model = "plate"' in text]
+    path = tmp_path / "assembly.toml"
+    path.write_text(content)
+    file, freq = read_assembly_file(path), np.array([100.0])
+    whole = file.assembly(freq, file.parts(freq), ["plate/5:z"])
+    assert {one.name: one.unit for one in whole.joint.quantities if one.field.name == "k"} == {
+        "clamp.k_z": "N/m per m",
+        "clamp.k_theta_x": "N m/rad per m",
+    }

@@ -81,7 +81,7 @@ def test_any_positive_number_of_a_beam_may_be_unknown(tmp_path):
         (
             'model = "beam"',
             'model = "receptances"\nfile = "x.uff"',
-            r"model must be one of chain, beam, brick-beam, matrices, not .receptances.",
+            r"model must be one of chain, beam, plate, brick-beam, matrices, not .receptances.",
         ),
     ],
 )

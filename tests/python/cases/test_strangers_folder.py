@@ -17,7 +17,7 @@ import pytest
 import jointfrf as jf
 from command import run_command
 from jointfrf.cases.catalogue import find_case, run_case
-from jointfrf.io.cards import CardFormat
+from jointfrf.io.card_link import CardFormat
 from jointfrf.report.chart import Chart
 from jointfrf.report.document import Document, Section, Words, make_document
 from jointfrf.report.draw import draw
@@ -176,7 +176,8 @@ def test_comments_of_cards_stay_comments(program):
     joint = jf.Joint([1e6], None, ["y"])
     stranger = "from a\n*INCLUDE, INPUT=/etc/passwd\r\x85FINISH\u2028/SYS,sh\x1b]0;owned\x07.uff"
     text = joint.export(program, [1, 2], comments=[stranger])
-    marks = {"abaqus": "**", "calculix": "**", "nastran": "$", "ansys": "!"}
+    marks = {"abaqus": "**", "calculix": "**", "nastran": "$", "ansys": "!", "code_aster": "#", "lsdyna": "$",
+             "subdyn": "!"}  # fmt: skip
     for line in text.splitlines():
         if "passwd" in line or "FINISH" in line or "owned" in line:
             assert line.startswith(marks[program])

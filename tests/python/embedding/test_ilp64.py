@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -236,7 +237,8 @@ def test_one_prefix_holds_both(libraries):
 
 #: Real arguments for which every routine does something; the others are zero.
 NUMBERS = {"offset": [0.0, 1.0], "youngs_modulus": [1.0], "density": [1.0], "level": [0.1], "coordinates": [0.0] * 24}
-NUMBERS |= {"share": [1.0], "spread_m": [1.0]}
+NUMBERS |= {"share": [1.0], "spread_m": [1.0], "floor_shape": [1.0], "inflation": [1.0], "freq": [1.0]}
+NUMBERS |= {"spring": [1.0], "variance": [1.0]}
 LETTERS = {"equation": b"rs", "trans": b"N", "kind": b"N", "reference": b"E", "method": b"S", "formulation": b"R"}
 #: Integer arguments that are not 1.
 INTEGERS = {
@@ -252,6 +254,13 @@ INTEGERS = {
 }
 #: Those that may have any value: of a seed the lower 32 bits count, and memory may be as long as it likes.
 FREE = {"seed", "lwork", "liwork", "n_text"}
+#: Arguments that are others in one routine.
+OWN: dict[str, dict[str, Any]] = {
+    "jf_estimate_noise_": {"first": 1},
+    "jf_fit_joint_": {"n_row": 2, "n_column": 2},
+    "jf_start_joint_": {"n_row": 2, "n_column": 2},
+    "jf_noise_parts_": {"method": b"L"},
+}
 ROUTINES = {
     name: [argument.split() for argument in arguments]
     for name, arguments in prototypes().items()
@@ -261,13 +270,13 @@ ROUTINES = {
 
 def call(library: ctypes.CDLL, name: str, **integers: int) -> int:
     """Call a routine with the smallest arguments that are good; return its info."""
-    memory = []
+    memory, own = [], OWN.get(name, {})
     for *kind, pointer in ROUTINES[name]:
         argument = pointer.removeprefix("*")
         if "char" in kind:
-            memory.append(ctypes.create_string_buffer(LETTERS[argument]))
+            memory.append(ctypes.create_string_buffer(own.get(argument) or LETTERS[argument]))
         elif "jf_int" in kind:
-            value = integers.get(argument, INTEGERS.get(argument, 1))
+            value = integers.get(argument, own.get(argument, INTEGERS.get(argument, 1)))
             memory.append((ctypes.c_int64 * 600)(value, *[1] * 3))
         else:
             memory.append((ctypes.c_double * 2000)(*NUMBERS.get(argument, [])))
@@ -282,7 +291,7 @@ def test_long_integers_are_not_taken_for_short_ones(library64, name):
     for i, (*kind, pointer) in enumerate(ROUTINES[name], start=1):
         argument = pointer.removeprefix("*")
         if "const" in kind and "jf_int" in kind and argument not in FREE:
-            short = INTEGERS.get(argument, 1)
+            short = OWN.get(name, {}).get(argument, INTEGERS.get(argument, 1))
             for value in (2**32 + short, 2**31, 2**62, short - 2**32):
                 tried += 1
                 assert call(library64, name, **{argument: value}) == -i, (argument, value)

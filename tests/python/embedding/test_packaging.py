@@ -6,6 +6,7 @@ import importlib.resources
 import os
 import pathlib
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -60,12 +61,26 @@ def test_recipes_ask_for_what_the_package_asks_for():
 
 
 def test_continuous_integration_calls_programs_that_are_there():
-    for path in (ROOT / ".github" / "workflows").glob("*.yml"):
-        jobs = yaml.safe_load(path.read_text(encoding="utf-8"))["jobs"]
-        lines = [step["run"] for job in jobs.values() for step in job["steps"] if "run" in step]
-        called = {word.removeprefix("./") for line in lines for word in re.findall(r"[.\w]*/[\w/.]+", line)}
-        assert {"tests/run", "tests/portability/run", "python/build_wheel.sh"} <= called
-        assert all((ROOT / name).is_file() for name in called), called
+    paths = (ROOT / ".github" / "workflows").glob("*.yml")
+    jobs = [job for path in paths for job in yaml.safe_load(path.read_text(encoding="utf-8"))["jobs"].values()]
+    lines = [step["run"] for job in jobs for step in job["steps"] if "run" in step]
+    called = {word.removeprefix("./") for line in lines for word in re.findall(r"(?<![\w./])[.\w]*/[\w/.]+", line)}
+    assert {"tests/run", "tests/portability/run"} <= called
+    assert all((ROOT / name).is_file() for name in called), called
+
+
+def test_wheels_of_every_system_leave_openblas_out_and_are_tested():
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["cibuildwheel"]
+    libraries = {
+        "linux": "libscipy_openblas.so",
+        "macos": "libscipy_openblas.dylib",
+        "windows": "libscipy_openblas.dll",
+    }
+    for system, library in libraries.items():
+        assert f"--exclude {library} " in settings[system]["repair-wheel-command"]
+    (script,) = re.findall(r"\{project\}/(\S+)", settings["test-command"])
+    files = runpy.run_path(str(ROOT / script))["FILES"]
+    assert all((ROOT / "tests" / "python" / name).is_file() for name in files)
 
 
 @pytest.mark.parametrize("name", CASES)

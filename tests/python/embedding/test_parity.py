@@ -15,6 +15,8 @@ pytestmark = pytest.mark.builds
 
 TESTS = Path(__file__).resolve().parents[2]
 SOURCES = {"FORTRAN 77": "f77/case.f", "Fortran": "fortran/case.f90", "C": "c/case.c"}
+#: The fit of a joint, alike.
+FITS = {"FORTRAN 77": "f77/identify.f", "Fortran": "fortran/identify.f90", "C": "c/identify.c"}
 ENTRY = re.compile(r"(\w+)\((\d),(\d)\) *(\d+) +(\S+) +(\S+)")
 
 
@@ -25,6 +27,17 @@ def programs(installed_library: InstalledLibrary, tmp_path_factory) -> dict[str,
     for language, source in SOURCES.items():
         commands[language] = [installed_library.compile(TESTS / source, folder / Path(source).name.replace(".", "_"))]
     return commands
+
+
+@pytest.fixture(scope="module")
+def fits(installed_library: InstalledLibrary, tmp_path_factory) -> dict[str, str]:
+    """What the programs that fit a joint print."""
+    folder = tmp_path_factory.mktemp("identify")
+    texts = {"Python": printed([sys.executable, TESTS / "python" / "support" / "identify_joint.py"], "auto")}
+    for language, source in FITS.items():
+        program = installed_library.compile(TESTS / source, folder / Path(source).name.replace(".", "_"))
+        texts[language] = printed([program], "auto", 2)
+    return texts
 
 
 def printed(command: list[str | Path], engine: str, threads: int = 1) -> str:
@@ -81,3 +94,30 @@ def test_means_are_those_of_the_package(values):
     for name, own in zip(("k_ismm", "k_short"), means.reshape(2, 4), strict=True):
         mean = jf.band_mean(case.FREQ_HZ, matrices[name], bands, list(bands))
         np.testing.assert_allclose(own, [*mean.stiffness, *mean.damping], rtol=1e-13)
+
+
+def fitted(text: str) -> dict[str, tuple[float, float]]:
+    """Values and standard errors by name."""
+    return {name: (float(value), float(error)) for name, value, error in map(str.split, text.splitlines())}
+
+
+def test_fits_of_four_languages_agree(fits):
+    for language, text in fits.items():
+        assert text.split()[::3] == fits["Python"].split()[::3], language
+        for name, own in fitted(text).items():
+            np.testing.assert_allclose(own, fitted(fits["Python"])[name], rtol=1e-4, err_msg=f"{language} {name}")
+
+
+def test_fitted_joint_is_the_exact_one_within_its_errors(fits):
+    exact = {"k_Fy": 6e5, "k_Mtheta": 5e3, "c_Fy": 20.0, "c_Mtheta": 1.5}
+    for name, (value, error) in fitted(fits["C"]).items():
+        assert abs(value - exact[name]) < 3 * error < 0.05 * exact[name]
+
+
+def test_shown_fit_is_what_the_programs_print(fits):
+    page = (TESTS.parent / "docs" / "embedding.md").read_text()
+    (shown,) = re.findall(r"```text\n(k_Fy.*?)```", page, re.DOTALL)
+    for name, own in fitted(shown).items():
+        np.testing.assert_allclose(own, fitted(fits["FORTRAN 77"])[name], rtol=1e-4)
+    (call,) = re.findall(r"```fortran\n( *CALL JF_FIT_JOINT.*?)```", page, re.DOTALL)
+    assert call in (TESTS / FITS["FORTRAN 77"]).read_text()

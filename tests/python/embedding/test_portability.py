@@ -1,5 +1,6 @@
 """The command that runs the numerical tests elsewhere: how it counts, and what it installs."""
 
+import configparser
 import os
 import re
 import runpy
@@ -65,6 +66,23 @@ def test_pythons(portability):
     assert portability.environments.VERSIONS[0] == portability.environments.OLDEST == "3.11"
     assert portability.environments.find_python("3.99") is None
     assert os.access(TESTS / "portability" / "run", os.X_OK)
+
+
+def test_other_machines_are_rows_where_their_tools_are(portability, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    rows = [row for row in portability.configurations.configurations() if row.machine]
+    assert [row.name for row in rows] == [
+        *("Linux on arm64, package", "Linux on arm64, programs", "Windows, package", "Windows, programs")
+    ]
+    assert not any(row.is_here for row in rows)
+    for machine in portability.machines.MACHINES:
+        assert len(machine.tools) == len(machine.packages)
+        for package in machine.packages:
+            assert package in portability.__main__.ABOUT
+        file = configparser.ConfigParser()
+        file.read(TESTS / "portability" / "machine-files" / machine.file)
+        named = {file["binaries"][key].strip("'") for key in ("c", "cpp", "fortran", "exe_wrapper")}
+        assert named == set(machine.tools)
 
 
 def test_checked_in_versions_are_those_that_are_asked_for():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import jointfrf as jf
 from jointfrf.amplitude.friction import bouc_wen, iwan, jenkins
@@ -120,3 +121,21 @@ def test_intervals_allow_for_levels_that_scatter_more_than_their_errors():
     for name, (low, high) in right.intervals.items():
         ends = small.intervals[name]
         assert (ends[1] - ends[0]) / (high - low) == pytest.approx(small.widened / 10, rel=0.02)
+
+
+def test_errors_that_all_levels_share_leave_chi_squared_and_stay_in_the_parameters():
+    a, draws = np.geomspace(1e-6, 1e-4, 8), 60
+    k, eta = np.full(8, 1e5), 0.01 * (a / 1e-5) ** 0.5
+    own = np.array([0.002 * k, np.full(8, 2e-4)])
+    shared = np.array([[0.02 * k * np.linspace(1, 1.3, 8), 0.1 * eta]])
+    errors = np.sqrt(own**2 + shared[0] ** 2)
+    rng, squares, inside, alone = np.random.default_rng(3), [], 0, []
+    for _ in range(draws):
+        value = np.array([k, eta]) + shared[0] * rng.normal() + own * rng.normal(size=(2, 8))
+        found = jf.fit_amplitude_laws(a, *value, *errors, common=shared, laws=["power"]).fits[0]
+        squares.append(found.chi_square)
+        inside += found.intervals["k"][0] < 1e5 < found.intervals["k"][1]
+        alone.append(jf.fit_amplitude_laws(a, *value, *errors, laws=["power"]).fits[0].chi_square)
+    assert abs(np.mean(squares) - 13) < 4 * np.sqrt(2 * 13 / draws)
+    assert np.mean(alone) < 13 / 2
+    assert inside >= stats.binom.ppf(1e-3, draws, 0.95)

@@ -1,9 +1,12 @@
 """Means and spreads of few values with errors of their own, against closed forms and draws with a known truth."""
 
+import itertools
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy import stats
+from scipy import linalg, stats
 from statsmodels.regression.mixed_linear_model import MixedLM
 
 from jointfrf.pooling.random_effects import Mixture, RandomEffects
@@ -131,6 +134,69 @@ def test_reml_agrees_with_the_likelihood_integrated_over_the_mean():
     assert_allclose(np.sqrt(effects.reml[0]), trial[int(np.argmax(logs))], atol=3e-4)
 
 
+def crossed(seed: int) -> RandomEffects:
+    """Values over two crossed factors, of which one or none makes a difference, with errors of their own."""
+    rng = np.random.default_rng(seed)
+    codes, other = np.repeat(np.arange(5), 3), rng.permutation(15) % 2
+    errors = rng.uniform(0.02, 0.06, 15)
+    values = rng.normal(0, 0.02, 2)[other] + rng.normal(0, errors)
+    design = np.column_stack([np.ones(15), rng.normal(size=15)])
+    return RandomEffects(values, np.diag(errors**2), design, [codes, other], points=32)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_reml_is_the_highest_point_of_the_likelihood_of_contrasts(seed):
+    effects = crossed(seed)
+    contrasts = linalg.null_space(effects.design.T)
+    groups = [np.eye(15), *((codes[:, None] == np.unique(codes)).astype(float) for codes in effects.factors)]
+
+    def likelihood(variances: np.ndarray) -> float:
+        total = effects.covariance + sum(v * z @ z.T for v, z in zip(variances, groups, strict=True))
+        return stats.multivariate_normal(cov=contrasts.T @ total @ contrasts).logpdf(contrasts.T @ effects.values)
+
+    trial = np.linspace(0, 0.06, 13) ** 2
+    highest = max(likelihood(np.array(one)) for one in itertools.product(trial, repeat=3))
+    assert likelihood(effects.reml) > highest - 1e-9
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_reml_does_not_hang_on_the_last_bits_of_the_values(seed):
+    effects, rng = crossed(seed), np.random.default_rng(seed)
+    size = np.diagonal(effects.covariance).mean()
+    for _ in range(3):
+        moved = replace(effects, values=effects.values * (1 + 1e-14 * rng.normal(size=15)))
+        assert_allclose(moved.reml, effects.reml, rtol=1e-6, atol=1e-8 * size)
+
+
+@pytest.mark.parametrize("count", [2, 5, 20])
+@pytest.mark.parametrize("ratio", [1e-6, 0.3, 2.0])
+def test_the_upper_limit_of_a_spread_agrees_with_its_closed_form(count, ratio):
+    """Of equal errors e, Q(t) = S / (e^2 + t); values that agree by chance leave the limit that the errors allow."""
+    error, degrees = 0.03, count - 1
+    values = np.random.default_rng(count).normal(size=count)
+    values *= error * np.sqrt(ratio) / values.std(ddof=1)
+    effects = RandomEffects(values, error**2 * np.eye(count), np.ones((count, 1)))
+    squares = degrees * ratio * error**2
+    quantile = stats.chi2.ppf(0.025 * stats.chi2.cdf(squares / error**2, degrees), degrees)
+    limit = effects.upper_limit(0, 0.025)
+    assert_allclose(limit, squares / quantile - error**2, rtol=1e-6)
+    assert limit > np.quantile(effects.variances[:, 0], 0.975)
+    assert limit > error**2 * (0.025 ** (-2 / degrees) - 1) * 0.999
+
+
+def test_errors_that_exceed_the_scatter_stay_in_the_mean():
+    rng = np.random.default_rng(11)
+    own, common = 0.003, 0.03
+    values = common * 1.1 + rng.normal(0, own, 12)
+    effects = RandomEffects(values, (own**2 + common**2) * np.eye(12), np.ones((12, 1)))
+    chance, share = effects.excess_of_errors
+    assert chance < 1e-6
+    assert_allclose(share, common**2 / (own**2 + common**2), atol=0.02)
+    narrow, wide = (one.combination(ONE).interval(0.95) for one in (effects, effects.with_shared_errors(share)))
+    assert narrow[0] > 0
+    assert wide[0] < 0 < wide[1]
+
+
 @pytest.mark.parametrize(
     ("count", "spread", "error"),
     [(3, 0.1, 0.02), (6, 0.3, 0.1), pytest.param(12, 0.05, 0.05, marks=pytest.mark.long)],
@@ -144,7 +210,7 @@ def test_intervals_hold(count, spread, error):
         effects = RandomEffects(values, np.diag(own**2), np.ones((count, 1)), points=128)
         low, high = effects.combination(ONE).interval(0.95)
         ahead = effects.combination(ONE, effects.variances[:, 0]).interval(0.95)
-        limits = np.sqrt(np.quantile(effects.variances[:, 0], [0.025, 0.975]))
+        limits = np.sqrt([np.quantile(effects.variances[:, 0], 0.025), effects.upper_limit(0, 0.025)])
         next_one = rng.normal(0, spread)
         inside += [low <= 0 <= high, ahead[0] <= next_one <= ahead[1], limits[0] <= spread <= limits[1]]
     assert (inside >= stats.binom.ppf(0.001, draws, 0.95)).all(), inside / draws

@@ -22,7 +22,7 @@ def as_shown(printed: str) -> str:
     lines = []
     for line in rounded.rstrip().splitlines():
         indent = " " * (len(line) - len(line.lstrip()))
-        sentence = len(line) > WIDTH and "  " not in line.strip()
+        sentence = len(line) > WIDTH and "  " not in line.strip() and set(line) != {"-"}
         broken = textwrap.wrap(line, WIDTH, subsequent_indent=indent + "    ", break_on_hyphens=False)
         lines += broken if sentence else [line.rstrip()]
     return "".join(line + "\n" for line in lines)

@@ -17,7 +17,7 @@ from jointfrf.errors import FileContentError
 from jointfrf.io import Channel, FrfSet, write_frfs
 from jointfrf.report.fit_model import is_wide
 from jointfrf.report.fit_page import ReportOptions, finding_sentences, fit_document
-from jointfrf.report.sketch import SketchedPart, _view_along, assembly_sketch, moved_parts
+from jointfrf.report.sketch import SketchedPart, _moved_parts, _view_along, assembly_sketch
 from jointfrf.toml.documents import schema_of
 
 FREQ = np.linspace(0.5, 10, 300)
@@ -84,6 +84,24 @@ def test_channels_signs_and_unknowns(tmp_path, frfs):
     prior = {one.name: one.prior for one in fit.parameters}["A/youngs_modulus"]
     assert prior == (1.0, 0.02)
     assert fit.test.is_noise
+
+
+def test_sensor_and_force_of_one_name_may_differ_in_sign(tmp_path, frfs):
+    """A sensor that points against the force at the driving point."""
+    expected = jf.measured_assembly(written(tmp_path), frfs)
+    h = frfs.h.copy()
+    h[:, 0] *= -1
+    turned = FrfSet(FREQ, frfs.responses, frfs.excitations, h, source="test.uff")
+    for channels in (
+        '"11:+x" = { response = "A/1:-x", force = "A/1:x" }\n"22:+x" = "B/2:-x"\n',
+        '"11:-x" = { response = "A/1:+x", force = "A/1:-x" }\n"22:-x" = { response = "B/2:x" }\n',
+    ):
+        text = ASSEMBLY.split('"11:+x"')[0] + channels
+        found = jf.measured_assembly(written(tmp_path, text), turned)
+        assert (found.responses, found.forces) == (expected.responses, expected.forces)
+        np.testing.assert_array_equal(found.h, expected.h)
+    only = ASSEMBLY.split('"11:+x"')[0] + '"11:+x" = { force = "A/1:x" }\n"22:-x" = "B/2:x"\n'
+    assert jf.measured_assembly(written(tmp_path, only), frfs).responses == ("B/2:x",)
 
 
 def test_values_at_the_start_do_not_matter(tmp_path, frfs):
@@ -270,9 +288,15 @@ def without(*lines: str) -> str:
          "'damping' are missing"),
         ("", r"the keys 'A' \(a table \[A\] with model\), 'B' \(a table \[B\] with model\), 'joint' are missing"),
         (ASSEMBLY.replace("masses", "mases", 1), r"\[A\]: unknown key 'mases'.*did you mean 'masses'"),
+        (
+            ASSEMBLY.replace('"22:-x"', '"11:-x"'),
+            r'11:-x.*: 11:\+x names this direction, too; name it once, as "11:-x" = { response = "A/1:-z", force',
+        ),
+        (ASSEMBLY.replace('"A/1:x"', '"A/1:-y"'), "neither A nor B has a DOF 'A/1:y'"),
+        (ASSEMBLY.replace('"A/1:x"', '{ sensor = "A/1:x" }'), "must be a text such as A/151:y, or a table"),
         (ASSEMBLY.replace("[channels]", "[chanels]"), "unknown key 'chanels'.*did you mean 'channels'"),
-        (ASSEMBLY.replace('"chain"', '"chian"', 1), r"\[A\]: model must be one of chain, beam, brick-beam, rigid-body, "
-         "matrices, receptances, modes, not 'chian'"),
+        (ASSEMBLY.replace('"chain"', '"chian"', 1), r"\[A\]: model must be one of chain, beam, plate, brick-beam, "
+         "rigid-body, matrices, receptances, modes, not 'chian'"),
         (ASSEMBLY.replace("0.02", "-0.02"), r"\[A\]: unknown must be .* positive .*not {'youngs_modulus': -0.02}"),
         (ASSEMBLY.replace("youngs_modulus", "young"), r"\[A\]: unknown: unknown number young.*loss_factor"),
         (ASSEMBLY.replace('["2:x"]', '["3:x"]'), r"\[A\]: joint: A has no DOF '3:x'"),
@@ -477,7 +501,7 @@ def test_a_sketch_of_many_parts_has_all_joints_where_they_meet():
         part("a", {"ab": ["4"], "ca": ["2"], "mount": ["0"]}), part("b", {"ab": ["2"], "bc": ["4"]}),
         part("c", {"bc": ["0"], "ca": ["4"]}),
     ]  # fmt: skip
-    moved, joints = moved_parts(parts)
+    moved, joints = _moved_parts(parts)
     np.testing.assert_allclose([own["0"][0] for own in moved], [0, 0.5, 0.5])  # the ring does not close
     assert {name: list(ends) for name, ends in joints.items()} == {
         "ab": [0, 1],

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from compliance_lines import exact_compliance, fitted, white
-from jointfrf.identification.manifold.beyond_noise import fit_band_parts, left_out_share
+from jointfrf.identification.manifold.band_parts import fit_band_parts, left_out_share
 from jointfrf.identification.manifold.coordinates import joint_terms
 
 FREQ = np.linspace(20.0, 500.0, 200)

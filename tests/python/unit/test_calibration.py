@@ -1,6 +1,8 @@
 """Errors of channels that are smooth over frequency: found from h_pq and h_qp, and carried into intervals."""
 
+import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,12 +10,13 @@ from scipy import stats
 
 import jointfrf as jf
 from jointfrf.frf.calibration import calibration_errors, shows_calibration
-from jointfrf.identification.calibration import CalibrationSpread, Effects, student_factor
 from jointfrf.identification.manifold.fit import fit_springs
 from jointfrf.identification.manifold.prepare import FitOptions, prepare_compliance
+from jointfrf.identification.minimise import minimise
+from jointfrf.identification.mixed import Effect, added_by, smooth_effects, student_factor
 from jointfrf.identification.model.fit import fit_assembly
 from jointfrf.identification.model.prepare import Channels, prepare_model_fit
-from jointfrf.identification.model.uncertainty import ModelGradient
+from jointfrf.identification.model.uncertainty import ModelLinearised
 from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import as_measured
 from jointfrf.identification.residual_test import check_residual
@@ -193,7 +196,9 @@ def test_covariance_at_the_joint_is_that_of_refits(h):
     own = 1 + 0.001 * np.random.default_rng(3).standard_normal((4, 4))
     measured = noisy(h * gains(2, 0.02) * own)
     fit = fit_at_joint(measured)
-    calibration = fit.calibration
+    (known,) = fit.known.groups
+    added = known.at.group.joint.theta_slope(known.at.group.x) @ known.smooth_added.covariance
+    added = added @ known.at.group.joint.theta_slope(known.at.group.x).T
     errors = fit.problem.noise.calibration
     size, total = 1e-3, np.zeros((4, 4))
     assert errors.channel.any()
@@ -202,20 +207,25 @@ def test_covariance_at_the_joint_is_that_of_refits(h):
         other = fit_springs(replace(fit.problem, frfs=fit.problem.frfs._replace(measured=measured * factor)))
         step = (other.estimate.theta - fit.estimate.theta) / size
         total += variance * np.outer(step, step)
-    np.testing.assert_allclose(np.sqrt(np.diag(calibration.covariance)), np.sqrt(np.diag(total)), rtol=0.05)
+    np.testing.assert_allclose(np.sqrt(np.diag(added)), np.sqrt(np.diag(total)), rtol=0.05)
 
 
 def test_covariance_with_models_is_that_of_refits(between_points):
     freq, measured = FREQ[::8], noisy(between_points * gains(4))[::8]
     problem = prepare_model_fit(freq, measured, assembly(exact=True), Channels(CHANNELS, CHANNELS), NoiseOptions(), ())
-    found = fit_assembly(problem)
-    errors = found.problem.noise.calibration
-    gradient = ModelGradient.of(found.problem.likelihood, found.minimum, found.problem.noise.inflation)
-    slope = found.problem.vector.slope(found.minimum.x)
-    covariance = gradient.calibration(errors, freq).covariance * np.outer(slope, slope)
+    # Such gains are errors of a fit, too, which takes them off: here they stay.
+    found = fit_assembly(problem).problem
+    start = found.vector.to_coordinates(found.vector.values)
+    minimum = minimise(found.likelihood, start)
+    errors = found.noise.calibration
+    at = ModelLinearised.of(found.likelihood, minimum, found.noise.inflation)
+    slope = found.vector.slope(minimum.x)
+    covariance = added_by(smooth_effects(at, errors, freq, (4, 4), np.ones((1, freq.size))), at).covariance
+    covariance = covariance * np.outer(slope, slope)
     size, total = 1e-3, np.zeros((4, 4))
     for variance, factor in errors_of_each(errors, freq, size):
-        step = (fit_assembly(replace(found.problem, measured=measured * factor)).values - found.values) / size
+        other = minimise(replace(found, measured=measured * factor).likelihood, minimum.x)
+        step = (found.vector.to_values(other.x) - found.vector.to_values(minimum.x)) / size
         total += variance * np.outer(step, step)
     np.testing.assert_allclose(np.sqrt(np.diag(covariance)), np.sqrt(np.diag(total)), rtol=0.1)
 
@@ -261,13 +271,31 @@ def test_student_for_few_channels():
     np.testing.assert_allclose(student_factor(one, 0 * one, np.inf * one), 1)
 
 
-def test_variances_of_effects_add_up(h):
-    errors = calibration_errors(FREQ, noisy(h * gains(2)))
-    steps = np.random.default_rng(0).standard_normal((8, *errors.channel.shape, 3))
-    spread = CalibrationSpread.of(errors, np.eye(3), lambda kind: Effects(steps, np.ones(errors.channel.shape)))
-    expected = np.einsum("ab,kabp,kabq->pq", errors.channel / 2, steps, steps)
-    np.testing.assert_allclose(spread.covariance, expected)
-    assert spread.squares == pytest.approx(errors.channel.sum() / 2)
+def test_variances_of_effects_add_up():
+    """By the definition, in coordinates whose covariance is known; parameters share their errors."""
+    rng = np.random.default_rng(0)
+    half = rng.standard_normal((3, 3))
+    at = SimpleNamespace(covariance=half @ half.T, slope=np.diag([2.0, 1.0, 0.5]))
+    effects = [
+        Effect(rng.standard_normal((5, 4, 3)), 0.3, 3.0, 2.0),
+        Effect(rng.standard_normal((2, 4, 3)), 0.1),
+    ]
+    added = added_by(effects, at)
+    steps = [one.gradient.sum(axis=1) @ at.covariance for one in effects]
+    own = [variance * step.T @ step for variance, step in zip((0.3, 0.1), steps, strict=True)]
+    np.testing.assert_allclose(added.covariance, sum(own))
+    np.testing.assert_allclose(added.degrees, 3)
+    np.testing.assert_allclose(added.estimated, np.diag(own[0]) / np.diag(sum(own)))
+    assert added.squares == pytest.approx(0.6)
+    assert added.squares_error == pytest.approx(0.6 * np.sqrt(2 / 3))
+
+
+def test_parts_of_the_band_differ_by_effects_that_move_them_apart():
+    """A unit error that moves both halves alike leaves no difference; one that moves them apart, twice its own."""
+    at = np.array([[1.0]])
+    for gradient, apart in ((np.ones((1, 2, 1)) / 2, 0.0), (np.array([[[0.5], [-0.5]]]), 1.0)):
+        found = Effect(gradient, 4.0).between(2 * np.ones((2, 1, 1)), np.array([True, True]), at)
+        np.testing.assert_allclose(found[:, 0, 0], 4 * apart, atol=1e-12)
 
 
 # In one draw of ten some part of the band exceeds its noise by chance.
@@ -276,8 +304,8 @@ def test_variances_of_effects_add_up(h):
 def test_scatter_between_lines_sees_noise_that_frfs_share(between_points):
     """Noise of a line common to all FRFs: 16 FRFs say as much of it as one."""
     shared = between_points * (1 + 0.03 * circular((FREQ.size, 1, 1), 7))
-    # Noise hides errors of models, too, which are then in both intervals: here there are none.
-    models = assembly(model_error=0)
+    # Noise hides errors of models and gains, too, which are then in both intervals: here there are none.
+    models = assembly(exact=True)
     fit = jf.identify_model(FREQ, noisy(shared), models, CHANNELS, CHANNELS)
     apart = jf.identify_model(FREQ, noisy(between_points, 0.03), models, CHANNELS, CHANNELS)
     for name in ("k_y", "c_y", "k_theta", "c_theta"):
@@ -350,7 +378,9 @@ def test_the_page_says_what_the_test_cannot_know(h, between_points):
     assert first[0].startswith("Sensors and hammers of the same DOFs differ by what the note on calibration says.")
     assert first[1].startswith("h_pq and h_qp differ by no more than noise: sensors and hammers agree.")
     assert first[2].startswith("No h_pq and h_qp were both measured on lines enough")
+    (delay,) = (text for text in said_of_blind_spots(agree) if "1 µs" in text)
+    assert re.search(r"In this test 1 µs changes k_y by [-+]0\.\d+ %", delay)
     for fit in (off, apart):
         rest = " ".join(said_of_blind_spots(fit)[1:])
-        for word in ("a delay of all hits", "resonate", "H1 estimates", "exp(-σt)"):
+        for word in ("A delay of all impacts", "resonate", "H1 estimates", "exp(-σt)", "Hann", "1 mm"):
             assert word in rest

@@ -13,7 +13,7 @@ import pytest
 import jointfrf as jf
 from calculix_deck import frequency_step, natural_frequencies
 from jointfrf.dofs import rigid_offset
-from jointfrf.io.cards import card_real
+from jointfrf.io.card_link import card_real
 from jointfrf.io.fe.bulk import bulk_number
 
 CCX = shutil.which("ccx")

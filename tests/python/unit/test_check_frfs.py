@@ -376,3 +376,38 @@ def test_coarse_lines_are_not_dead_but_noise_on_them_is(step):
         (finding,) = jf.check_frfs(freq, bad, NAMES).findings
         assert (finding.code, finding.about) == ("dead-channel", (f"{'response' if is_row else 'force'} {NAMES[1]}",))
         assert finding.numbers["agreement"] < finding.numbers["least"]
+
+
+def test_an_average_from_another_point_is_named(beams):
+    """One record of five in one column: that channel is named, and none where all are right or one is only noisy."""
+    gamma = beams.gamma(beams.joint)
+    names = ["j:y", "j:theta", "k:y", "k:theta"]
+    for seed in range(10):
+        wrong, weak = gamma.copy(), jf.pollute(gamma, 0.002, seed=seed)
+        wrong[:, :, 2] = 0.9 * gamma[:, :, 2] + 0.1 * gamma[:, :, 0]
+        weak[:, 3] = jf.pollute(gamma, 0.2, seed=seed)[:, 3]
+        for h, expected in ((jf.pollute(wrong, 0.002, seed=seed), [("k:y",)]), (weak, [])):
+            found = jf.check_frfs(beams.freq, h, names).findings
+            assert [one.about for one in found if one.code == "channel-inconsistent"] == expected
+
+
+def test_a_rotor_is_gyroscopic_and_reversed_sensors_are_not():
+    """Four shaft nodes in two directions, with skew gyroscopic terms: h_xy = -h_yx."""
+    freq, n = np.linspace(20, 600, 400), 4
+    omega = 2 * np.pi * freq
+    chain = 1e6 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+    gyroscopic = np.kron([[0, 1], [-1, 0]], 300 * np.diag(np.linspace(0.5, 1, n)))
+    z = np.kron(np.eye(2), chain) * (1 + 0.01j) + 1j * omega[:, None, None] * gyroscopic
+    h = np.linalg.inv(z - omega[:, None, None] ** 2 * np.eye(2 * n))
+    rows = [1, 2, n + 1, n + 2]
+    h, names = jf.pollute(h[:, rows][:, :, rows], 0.01, seed=1), ["a:x", "b:x", "a:y", "b:y"]
+    (found,) = jf.check_frfs(freq, h, names).findings
+    assert (found.code, found.severity) == ("gyroscopic", "error")
+    symmetric = (h + h.swapaxes(1, 2) * np.outer([1, 1, -1, -1], [1, 1, -1, -1])) / 2
+    reversed_x = jf.pollute(abs(symmetric) * 0 + symmetric * np.outer([1, 1, -1, -1], [1, 1, 1, 1]), 0.01, seed=2)
+    assert "gyroscopic" not in [one.code for one in jf.check_frfs(freq, reversed_x, names).findings]
+    order = [0, 2, 1, 3]
+    fit = jf.identify(freq, h[:, order][:, :, order], ["x", "y"], reciprocal=False, damping="hysteretic")
+    np.testing.assert_allclose(fit.stiffness, 1e6, rtol=0.01)
+    with pytest.raises(jf.FrfCheckError, match="gyroscopic"):
+        jf.identify(freq, h[:, order][:, :, order], ["x", "y"])

@@ -42,8 +42,7 @@ class Call:
     def run(self, on_singular: str = "nan"):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", jf.IllConditionedWarning)
-            result, status = call.run(self.routine, self.args, self.shape, self.sweeps, None, on_singular)
-        return result, status.line_info, status.rcond
+            return call.run(self.routine, self.args, self.shape, self.sweeps, None, on_singular)
 
     def failure(self) -> tuple[type, str] | None:
         """What the public functions would raise."""

@@ -4,12 +4,12 @@ import errno
 import os
 import stat
 from contextlib import suppress
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 
 import pytest
 
 from jointfrf.errors import FileContentError
-from jointfrf.files import OwnFolder, clean_name, write_file
+from jointfrf.files import OwnFolder, check_file, clean_name, write_file
 
 
 def test_a_file_is_replaced_and_nothing_else_is_left(tmp_path):
@@ -74,7 +74,7 @@ def test_a_link_stays_a_link(tmp_path):
     assert (tmp_path / "inner" / "b.txt").read_text() == "made"
     assert not (tmp_path / "inner" / "a.txt").is_symlink()
     (tmp_path / "round").symlink_to("round")
-    with pytest.raises(OSError, match="too many levels of symbolic links"):
+    with pytest.raises(OSError, match="Too many levels of symbolic links"):
         write_file(tmp_path / "round", "")
 
 
@@ -146,7 +146,7 @@ def test_a_message_names_the_file(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "name", ["../../pwn", "/etc/passwd", "a/b", ".bashrc", "-rf", "a\0b", "x" * 300, "a\nb", "ä:y", ""]
+    "name", ["../../pwn", "/etc/passwd", "a/b", ".bashrc", "-rf", "a\0b", "x" * 300, "a\nb", "ä:y", "", "nul", "COM1.x"]
 )
 def test_a_name_of_anybody_is_that_of_a_file_in_the_folder(tmp_path, name):
     own = OwnFolder(tmp_path)
@@ -155,6 +155,7 @@ def test_a_name_of_anybody_is_that_of_a_file_in_the_folder(tmp_path, name):
     assert [each.name for each in tmp_path.iterdir()] == [path.name]
     assert path.name.isascii()
     assert path.name.isprintable()
+    assert not PureWindowsPath(path.name).is_reserved()
     assert path.name != clean_name(name + "_", ".png")
 
 
@@ -257,3 +258,12 @@ def test_a_file_of_a_folder_keeps_its_mode_and_is_whole_or_as_it_was(results, mo
     assert caught.value.filename == str(path)
     assert path.read_text() == "new"
     assert sorted(results.entries()) == ["a.csv", "b.csv"]
+
+
+def test_a_file_name_that_is_nearly_right_is_proposed(tmp_path):
+    (tmp_path / "two_bars.uff").write_text("x")
+    (tmp_path / "two_bar\x1b[31m.uff").write_text("characters that a terminal interprets are not proposed")
+    with pytest.raises(FileNotFoundError, match=r"there is no file .*two_bar\.uff; did you mean two_bars\.uff\?"):
+        check_file(tmp_path / "two_bar.uff")
+    with pytest.raises(FileNotFoundError, match=r"there is no file \S*other\.npz$"):
+        check_file(tmp_path / "other.npz")

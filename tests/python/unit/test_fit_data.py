@@ -140,3 +140,17 @@ def test_channels_are_named(beams):
              for own in ((1, 2, 3), (4, 5, 6))]  # fmt: skip
     fit = jf.identify(beams.freq, h, transform=jf.virtual_interface(*sides))
     assert fit.data.force_names == tuple(f"force {i}" for i in range(6))
+
+
+def test_effects_of_hidden_errors_are_those_of_refits(beams):
+    """A tenth of each: delay of 1 us, resonances at ten times the highest line, 1 % of noise in the force."""
+    freq, omega = beams.freq, 2 * np.pi * beams.freq
+    h = jf.pollute(beams.gamma(beams.joint), 0.002, seed=1)
+    fit = jf.identify(freq, h, beams.joint.dofs, damping="viscous", noise=0.002)
+    errors = {"delay": -1e-6j * omega, "resonance": (freq / (10 * freq.max())) ** 2, "force-noise": -0.01 + 0 * freq}
+    for name, own in fit.data.hidden_errors().items():
+        moved = h * (1 + errors[name] / 10)[:, None, None]
+        other = jf.identify(freq, moved, beams.joint.dofs, damping="viscous", noise=0.002)
+        for parameter, change in own.items():
+            expected = 10 * (other.value[parameter] - fit.value[parameter])
+            assert change == pytest.approx(expected, rel=0.03, abs=0.1 * fit.std_error[parameter])

@@ -111,6 +111,7 @@ def test_a_later_version_is_one_sentence(fits, tmp_path):
         ("-1\n    -1\n    58", "it is not JSON"),
         (b"\x00\xff\xfe", "it is not JSON"),
         ("[" * 100_000, "it is not JSON"),
+        ('{"format_version": ' + "9" * 5000 + "}", "it is not JSON"),
         ('{"format": "jointfrf joint", "format_version": "x"}', '"format_version" must be a whole number'),
     ],
 )

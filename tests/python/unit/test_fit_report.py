@@ -1,6 +1,5 @@
 """The report of an identification: what it says and draws, and that what is thinned hides nothing."""
 
-import base64
 import json
 import re
 import warnings
@@ -10,8 +9,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from documents import ROOT
-from jointfrf.assembly_file.measured import measured_assembly
+from jointfrf.channels.joint_channels import node_dofs
 from jointfrf.dofs import DIRECTIONS, joint_parameters
 from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.result import Fit
@@ -23,7 +21,6 @@ from jointfrf.report.fit import fit_figures
 from jointfrf.report.fit_frfs import compare_frfs
 from jointfrf.report.fit_page import ReportOptions, finding_sentences, fit_document, parameter_table, quality_sentences
 from jointfrf.report.sketch import _names, interface_points, interface_sketch, point_table
-from jointfrf.report.space import space_of_fit
 from jointfrf.report.table import written
 
 
@@ -324,7 +321,7 @@ def test_the_table_of_points_has_no_coordinate_that_nobody_measured():
     assert [row[3] for row in table.rows] == [None] * 4
     assert [row[2] for row in table.rows] == pytest.approx([-100, -200, 100, 200])
     assert "-0" not in [cell for row in written(table) for cell in row]
-    assert "does not say where along its direction" in table.note
+    assert "nor do the directions of the channels" in table.note
 
 
 def test_lines_left_out_are_drawn_apart(fits):
@@ -390,7 +387,7 @@ def long_fit(n_freq: int, n: int) -> Fit:
     data = FitData(
         h, names, names, np.eye(2 * n), np.eye(2 * n), (np.eye(2 * n), np.eye(2 * n)), None, True, 1e-4 * abs(h) ** 2,
         1.0, None, None, np.ones((n_freq, n), bool), lambda own: 0.99 * h[own], lambda: np.full((n_freq, n), 1e-4 + 0j),
-        lambda: np.full((n_freq, 2 * n), 1 / n_freq),
+        lambda: np.full((n_freq, 2 * n), 1 / n_freq), dict,
     )  # fmt: skip
     bands = (((1.0, 2000.0),),) * n
     return Fit.of_springs(
@@ -435,7 +432,7 @@ def test_the_same_fit_gives_the_same_page(fits, tmp_path, monkeypatch):
 def test_cards_stand_between_the_nodes_named(fits):
     parts = {part.name: part.text for section in fit_document(fits["plain"], ReportOptions(nodes=(7, 9))).sections
              if section.key == "cards" for part in section.parts if hasattr(part, "text")}  # fmt: skip
-    assert list(parts) == ["Abaqus", "CalculiX (stiffness only)", "Nastran", "Ansys"]
+    assert list(parts) == ["Abaqus", "CalculiX (stiffness only)", "Nastran", "Ansys", "Code_Aster", "LS-DYNA"]
     assert parts["Abaqus"] == jf.cards(fits["plain"], "abaqus", (7, 9))
     # DOFs without a direction have no cards, which is said.
     document = fit_document(fits["numbers"], ReportOptions())
@@ -468,51 +465,11 @@ def test_styles_differ_in_grey():
                 )
 
 
-def test_a_view_in_space_moves_points_as_their_frfs_say():
-    frfs = jf.io.read_frfs(ROOT / "cases/hammer-test/two_bars.uff").receptance()
-    sides = jf.interface([101, 102], [201, 202], ["y", "theta_z"], frfs.coordinates)
-    up = frfs.matrix(sides.channels, sides.channels)
-    order = np.random.default_rng(3).permutation(frfs.freq_hz.size)  # of the lines
-    with pytest.warns(jf.FrfCheckWarning, match="do not increase"):
-        fit = jf.identify(frfs.freq_hz[order], up[order], transform=sides)
-    view = space_of_fit(fit, ())
-    found = shapes_of(view.content)
-    lines = np.searchsorted(frfs.freq_hz, np.array(view.content["freq"]) - 1e-3)
-    assert np.all(np.diff(lines) > 0)
-    assert lines.size > 100
-    wanted = np.swapaxes(up[lines], 1, 2)  # every point has one channel, along y
-    size = abs(wanted).max(axis=2, keepdims=True)
-    strong = (abs(found[0]).max(axis=(2, 3)) > 126)[..., None]  # elsewhere the shape regenerated is the larger
-    assert strong.mean() > 0.3
-    # 1.75 of the scale, which the other shape may set, 0.75 of rounding both parts
-    np.testing.assert_allclose(np.where(strong, found[0, ..., 1] - 127 * wanted / size, 0), 0, atol=2.5)
-    assert not found[..., [0, 2]].any()
-    assert np.median(abs(found[1] - found[0])) < 3  # regenerated about as measured
-    assert abs(found).max() <= 127 * 1.01
-    assert [hit[1:] for hit in view.content["hits"]] == [[i, 0, 1, 0] for i in range(4)]
-    places = [1e3 * np.array(frfs.coordinates[int(name)]) for name in view.content["points"]]
-    np.testing.assert_allclose(view.content["at"], places, atol=1e-3)
-    assert 0 < view.content["peak"] < lines.size
-
-
-def shapes_of(content):
-    """Return shapes as the script of the page reads them: (source, line, force, point, 3), complex."""
-    size = (2, len(content["freq"]), len(content["hits"]), len(content["points"]), 3, 2)
-    parts = np.frombuffer(base64.b64decode(content["shapes"]), np.int8).reshape(size).astype(float)
-    return parts[..., 0] + 1j * parts[..., 1]
-
-
-def test_a_view_in_space_of_a_fit_with_models_has_both_parts(tmp_path):
-    frfs = jf.io.read_frfs(ROOT / "cases/lap-beam/level_1.uff").receptance()
-    measured = measured_assembly(ROOT / "cases/lap-beam/assembly.toml", frfs)
-    fit = measured.fit()
-    content = space_of_fit(fit, measured.sketched).content
-    assert content["points"] == ["A/1", "A/15", "B/9", "B/25"]
-    assert content["sides"] == [0, 0, 1, 1]
-    assert content["at"][3][0] > content["centres"][0][0] > content["at"][1][0] > content["at"][0][0]
-    assert content["hits"] == [["A/1:y", 0, 0, 1, 0]]
-    assert np.median(abs(np.diff(shapes_of(content), axis=0))) < 3
-    assert space_of_fit(fit, ()) is None
-    assert "newPlot" not in jf.write_report(fit, tmp_path / "report.html", parts=measured.sketched).read_text()
-    (section,) = [one for one in fit_document(fit, ReportOptions(space=True)).sections if one.key == "joint"]
-    assert "no view in space" in section.parts[0].sentences[0]
+def test_a_rotation_has_its_axis_and_a_point_without_coordinates_has_none():
+    sides = node_dofs(1, 2, ["y", "theta_z"], {})
+    for one in interface_points(sides):
+        assert one.known == (False, False, False)
+    table = point_table(interface_points(sides))
+    assert [row[2:] for row in table.rows] == [(None, None, None, "+y, +rz")] * 2
+    placed = point_table(interface_points(node_dofs(1, 2, ["y", "theta_z"], {1: (0, 0, 0.1), 2: (0, 0, 0.1)})))
+    assert [row[2:] for row in placed.rows] == [(0.0, None, 100.0, "+y, +rz")] * 2

@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,8 @@ import pytest
 import jointfrf.io
 from command import run_command
 from format_table import filled
-from jointfrf.io.formats import FORMATS, format_names
+from jointfrf.choices import FRF_FORMATS, MAPPING_FIELDS, format_names
+from jointfrf.io.formats import FORMATS
 from new_kinds import FORMAT
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -23,7 +25,7 @@ class Copy:
     @staticmethod
     def find_spec(name, path, target=None):
         return PathFinder.find_spec(name, path or [sys.argv[1]]) if name.startswith("jointfrf.io.") else (
-            PathFinder.find_spec(name, [sys.argv[1]]) if name == "jointfrf.io" else None)
+            PathFinder.find_spec(name, [sys.argv[1]]) if name in ("jointfrf.io", "jointfrf.choices") else None)
 
 sys.meta_path.insert(0, Copy)
 sys.path.insert(0, sys.argv[2])
@@ -58,9 +60,12 @@ def test_a_format_that_is_added_is_found_everywhere(tmp_path):
     room = tmp_path / "rooms" / "io"
     shutil.copytree(Path(jointfrf.io.__file__).parent, room, ignore=shutil.ignore_patterns("__pycache__"))
     (room / "pairs_file.py").write_text(FORMAT)
-    table = (room / "formats.py").read_text()
-    assert '    "csv_file",\n' in table
-    (room / "formats.py").write_text(table.replace('    "csv_file",\n', '    "csv_file",\n    "pairs_file",\n'))
+    words = (Path(jointfrf.__file__).parent / "choices.py").read_text()
+    line = "FRF_FORMATS = {\n"
+    assert line in words
+    added = '    "pairs_file": _FormatName("Pairs", (".pairs",)),\n}\n'
+    table, rest = words.partition(line)[2].split("}\n", 1)
+    (room.parent / "choices.py").write_text(words.partition(line)[0] + line + table + added + rest)
     script = tmp_path / "use.py"
     script.write_text(PROGRAM + USE)
     words = [sys.executable, script, room.parent, ROOT / "tests" / "python" / "support"]
@@ -80,6 +85,12 @@ def test_the_page_has_the_table_of_the_formats():
     assert filled(page) == page
 
 
+def test_words_of_the_command_line_are_those_of_the_formats():
+    stated = [(each.name, each.suffixes, each.write is not None) for each in FORMATS]
+    assert stated == list(FRF_FORMATS.values())
+    assert tuple(field.name for field in fields(jointfrf.io.FrfMapping)) == MAPPING_FIELDS
+
+
 def test_every_suffix_belongs_to_one_format():
     suffixes = [suffix for each in FORMATS for suffix in each.suffixes]
     assert len(set(suffixes)) == len(suffixes)
@@ -93,9 +104,9 @@ def test_the_help_lists_the_formats_that_are_written(command):
 
 def test_a_name_without_a_known_suffix_is_not_written(tmp_path):
     frfs = jointfrf.io.read_frfs(ROOT / "cases" / "hammer-test" / "two_bars.uff")
-    for name in ("a", "a.mat", "a.xlsx"):
+    for name in ("a", "a.tdms", "a.xlsx"):
         with pytest.raises(
-            ValueError, match=r"has no suffix of a format that is written; use one of \.uff, \.unv, \.npz"
+            ValueError, match=r"has no suffix of a format that is written; use one of \.uff, \.unv, \.mat"
         ):
             jointfrf.io.write_frfs(tmp_path / name, frfs)
     jointfrf.io.write_frfs(tmp_path / "A.CSV", frfs)

@@ -19,10 +19,11 @@ from frf_files import (
 )
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.io import FrfMapping, frfs_of_arrays, read_frfs, write_csv, write_hdf5, write_npz, write_uff
+from jointfrf.io import write_mat as write_matlab
 
 pytest.importorskip("h5py")
 
-WRITERS = {"a.uff": write_uff, "a.npz": write_npz, "a.h5": write_hdf5, "a.csv": write_csv}
+WRITERS = {"a.uff": write_uff, "a.npz": write_npz, "a.h5": write_hdf5, "a.csv": write_csv, "a.mat": write_matlab}
 GRAVITY = 9.80665
 
 
@@ -470,7 +471,9 @@ def test_arrays_of_pyfbs():
     assert names(found.responses) == ["1:+x", "1:-y", "2:+z"]
     np.testing.assert_array_equal(found.coordinates[2], [0.1, 0, 0])
     np.testing.assert_array_equal(found.h, h)
-    with pytest.raises(ValueError, match=r"row 2 of the responses points along \(1, 1, 0\), not along an axis"):
+    with pytest.raises(
+        ValueError, match=r"row 2 of the responses does not point along an axis; use jointfrf\.io\.from_pyfbs"
+    ):
         frfs_of_arrays(FREQ_HZ, h, table | {"Direction_1": [1, 1, 0], "Direction_2": [0, 1, 0]}, table)
     with pytest.raises(ValueError, match="table of the excitations has no column Position_1"):
         frfs_of_arrays(FREQ_HZ, h, table, {"Direction_1": [], "Direction_2": [], "Direction_3": []})
@@ -593,3 +596,40 @@ def test_nodes_that_are_wanted(tmp_path, name):
     np.testing.assert_array_equal(found.coherence, full_set().coherence[:, :2, :1])
     with pytest.raises(FileContentError, match="no FRF between nodes 7, 8"):
         read_frfs(tmp_path / name, nodes={7, 8})
+
+
+def test_text_tables_without_channels(tmp_path):
+    """As an analyser exports them: several functions, magnitude and phase; the names are those of the user."""
+    given = frf_set()
+    size, angle = abs(given.h), np.angle(given.h, deg=True)
+    names_of, columns = ["f [Hz]"], [FREQ_HZ]
+    for i, j in np.ndindex(3, 2):
+        names_of += [f"Magnitude (m/s^2/N) FRF {i}", "Phase [deg]"]
+        columns += [size[:, i, j], angle[:, i, j]]
+    path = tmp_path / "a.csv"
+    path.write_text(
+        "\n".join([";".join(names_of), *(";".join(map(repr, row)) for row in np.stack(columns, 1).tolist())])
+    )
+    pairs = [(str(one), str(other)) for one in given.responses for other in given.excitations]
+    mapping = {"responses": [pair[0] for pair in pairs], "excitations": [pair[1] for pair in pairs]}
+    same(read_frfs(path, mapping=mapping), given, rtol=1e-12)
+    for change, message in (
+        ({"responses": None, "excitations": None}, "or give mapping responses= and excitations="),
+        ({"excitations": None}, r"mapping names responses only; give mapping excitations=\.\.\. too"),
+        ({"responses": "1:x,2:x"}, "holds 6 functions of a kind, and mapping responses= has 2 names"),
+        ({"responses": "1:x", "excitations": "1:x"}, r"mapping names 1:\+x / 1:\+x twice; name each FRF once"),
+    ):
+        with pytest.raises(FileContentError, match=message):
+            read_frfs(path, mapping=mapping | change)
+    write_csv(path, given)
+    with pytest.raises(FileContentError, match="names its channels; leave out mapping responses= and excitations="):
+        read_frfs(path, mapping=mapping)
+
+
+def test_ranges_of_nodes(tmp_path):
+    path = write_mat(tmp_path / "a.mat", A=frf_set().h[:, :, 0])
+    mapping = {"h": "A", "freq_hz": "10:10", "response_nodes": "7,11:12", "response_directions": "z",
+               "excitations": "7:z"}  # fmt: skip
+    assert names(read_frfs(path, mapping=mapping, unit="m/N").responses) == ["7:+z", "11:+z", "12:+z"]
+    with pytest.raises(FileContentError, match=r"7:5 is no list of nodes such as 1,2 or 1:81"):
+        read_frfs(path, mapping=mapping | {"response_nodes": "7:5"}, unit="m/N")

@@ -110,7 +110,7 @@ def test_what_is_wrong_is_said():
 
 
 def test_a_coupled_joint_of_few_lines_is_fitted_without_going_to_and_fro():
-    """Linearised where it ended last, the fit of 42 terms to 123 lines jumped between two points."""
+    """NormalEquations where it ended last, the fit of 42 terms to 123 lines jumped between two points."""
     frfs = noisy(hammer_test()).receptance()
     found = sides(frfs)
     transforms = (found.responses, found.forces)
@@ -126,12 +126,19 @@ def test_a_coupled_joint_of_few_lines_is_fitted_without_going_to_and_fro():
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [0, 5])
 def test_a_coupled_joint_that_noise_half_hides_is_found_and_holds(seed):
-    """Of lines alone k_theta_x begins 700 times too stiff; near the end steps lead to and fro in a flat direction."""
+    """Of lines alone k_theta_x begins 700 times too stiff; near the end steps lead to and fro in a flat direction.
+
+    What the inertia of the sides adds to k_theta_x comes from lines whose own noise is up to 100 times the compliance:
+    whether its interval is as wide as the value depends on the draw.
+    """
     frfs = noisy(hammer_test(), seed=seed).receptance()
     found = jf.joint_channels(frfs, jf.places_of_nodes(frfs, J, K), POINT, DOFS)
-    fit = jf.identify(frfs.freq_hz, found.gamma(frfs), transform=(found.responses, found.forces), cross="fit")
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"k_theta_x .*\[poorly-determined\]$", jf.IdentificationWarning)
+        fit = jf.identify(frfs.freq_hz, found.gamma(frfs), transform=(found.responses, found.forces), cross="fit")
     assert fit.is_converged
     assert not [one for one in fit.findings if one.code in {"residual-large", "lines-rejected", "not-converged"}]
+    assert np.array([fit.value[f"k_{dof}"] for dof in DOFS]) == pytest.approx(JOINT.stiffness.diagonal(), rel=0.1)
     intervals = fit.confidence_interval(0.99)
     for dof, k, c in zip(DOFS, JOINT.stiffness.diagonal(), JOINT.damping.diagonal(), strict=True):
         for name, true in ((f"k_{dof}", k), (f"c_{dof}", c)):

@@ -1,11 +1,13 @@
 """Laws of joints: K*(w) and its derivatives, what joints are made of them, coupling through them, cards."""
 
+from importlib import import_module
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import jointfrf as jf
+from jointfrf.laws import words
 
 OMEGA = 2 * np.pi * np.linspace(5, 900, 60)
 LAWS = {
@@ -23,6 +25,11 @@ LAWS = {
         [2e5, 0.01],
     ),
 }
+
+
+def test_words_of_laws_are_those_of_their_classes():
+    for word, (module, name) in words.LAWS.items():
+        assert getattr(import_module(f"jointfrf.laws.{module}"), name).word == word
 
 
 @pytest.mark.parametrize("name", LAWS)

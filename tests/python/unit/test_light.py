@@ -10,12 +10,27 @@ import pytest
 
 import jointfrf
 from command import run_command
+from jointfrf.cli.parser import COMMANDS
 from jointfrf.extras import check_extras, import_extra
 
 #: Packages of single tasks; those in ALL come with the extra `all`.
 ALL = ("h5py", "jinja2", "matplotlib", "shtab", "pyarrow")
 EXTRAS = (*ALL, "zarr", "loky", "distributed", "mpi4py")
 HEAVY = {"numpy", "scipy", "matplotlib", "jinja2", "h5py", "shtab", "importlib.metadata", "jointfrf._kernel"}
+#: What may be imported before the arguments of a command are parsed.
+LIGHT = {"choices", "cli", "directions", "extras", "laws", "messages", "spelling"}
+#: Help, completion and usage errors.
+COMMANDS_PARSED = (
+    *([name, "--help"] for name in COMMANDS),
+    ["completion", "bash"],
+    ["identfy"],
+    ["identify"],
+    ["identify", "test.uff", "--dof", "y"],
+    ["identify", "test.uff", "--dofs", "q"],
+    ["identify", "test.uff", "--j", "101:"],
+    ["identify", "test.uff", "--law", "y=springy"],
+    ["export", "joint.json", "abacus:1,2"],
+)
 
 
 def modules_after(code: str) -> set[str]:
@@ -36,6 +51,15 @@ def test_help_imports_nothing_heavy():
     found = modules_after(call)
     assert "jointfrf.cli.main" in found
     assert not found & HEAVY
+
+
+@pytest.mark.parametrize("words", COMMANDS_PARSED, ids=" ".join)
+def test_arguments_are_parsed_before_anything_that_computes_is_imported(words):
+    call = f"from jointfrf.cli.main import main\nwith suppress(SystemExit), redirect_stdout(StringIO()): main({words})"
+    found = modules_after(f"from contextlib import redirect_stdout, suppress\nfrom io import StringIO\n{call}")
+    assert "jointfrf.cli.main" in found
+    assert not found & (HEAVY - {"shtab", "importlib.metadata"})  # completion; laws of other packages
+    assert not [name for name in found if name.startswith("jointfrf.") and name.split(".")[1] not in LIGHT]
 
 
 def test_a_name_imports_only_what_it_needs():

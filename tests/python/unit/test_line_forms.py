@@ -28,7 +28,7 @@ class Problem:
             noise * size
         )
         self.measured = exact + noise * size * random(rng, *exact.shape) / np.sqrt(2)
-        # Linearised anywhere: here at a compliance a little off.
+        # NormalEquations anywhere: here at a compliance a little off.
         self.about = 1.1 * exact
         residual = (self.a @ (self.measured - self.about)[..., None])[..., 0]
         adjoint = self.a.conj().swapaxes(1, 2)

@@ -5,7 +5,7 @@ import pytest
 
 from compliance_lines import exact_compliance, fitted, white
 from jointfrf.identification.manifold.coordinates import joint_terms
-from jointfrf.identification.manifold.uncertainty import residual_test_of, spread_of
+from jointfrf.identification.manifold.uncertainty import residual_test_of, uncertainty_of_joint
 from jointfrf.identification.residual_test import ResidualTest
 
 FREQ = np.linspace(20.0, 500.0, 200)
@@ -23,7 +23,7 @@ def found(stiffness=None, offset=0.0, noise=NOISE, seed=0):
 
 
 def diagnosed(estimate, inflation, freq=FREQ):
-    return residual_test_of(estimate, freq, inflation, spread_of(estimate, inflation))
+    return residual_test_of(estimate, freq, inflation, uncertainty_of_joint(estimate, freq, inflation))
 
 
 def of_joint(k_x=THETA[0], c_x=THETA[2]):

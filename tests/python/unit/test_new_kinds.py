@@ -61,12 +61,8 @@ assert "`twice`" in shown.getvalue()
 def test_a_new_law_is_one_file_and_one_line(tmp_path):
     tree = copied(tmp_path)
     (tree / "laws" / "inertial_spring.py").write_text(LAW)
-    line = "LAWS: tuple[type[JointLaw], ...] = (SpringLaw,"
-    put(
-        tree / "laws" / "joint_toml.py",
-        line,
-        f"from jointfrf.laws.inertial_spring import InertialSpring\n{line} InertialSpring,",
-    )
+    line = '    "spring": ("springs", "SpringLaw"),\n'
+    put(tree / "laws" / "words.py", line, f'{line}    "inertial-spring": ("inertial_spring", "InertialSpring"),\n')
     run(tmp_path, USES_LAW)
 
 

@@ -274,6 +274,26 @@ def test_parts_by_maximum_likelihood_against_a_search():
     assert loss(*parts) < min(loss(one, two) for one in grid for two in grid) + 1e-3
 
 
+@pytest.mark.parametrize("ratio", [1.0, 16.0])
+def test_floors_that_hardly_differ_are_one(ratio):
+    """Few lines of each entry show its floor: one floor is nearer to the truth than one of each, unless they differ."""
+    rng = np.random.default_rng(2)
+    size = np.geomspace(1e-2, 1e3, 400) * np.ones((6, 1))
+    floor = np.geomspace(1, ratio, 6)
+    terms = np.stack([size, np.ones_like(size)])
+    away = []
+    for _ in range(20):
+        squares = (size + floor[:, None]) * rng.exponential(size=size.shape)
+        found = noise_parts(squares, terms, common=True)
+        away.append([np.log(found[1] / floor), np.log(noise_parts(squares, terms)[1] / floor)])
+        np.testing.assert_allclose(found[0], 1, rtol=0.4)
+        assert (np.ptp(found[1]) < 1e-12) == (ratio == 1)
+    chosen, own = np.sqrt(np.square(away).mean(axis=(0, 2)))
+    assert chosen < (0.6 if ratio == 1 else 1.01) * own
+    none = noise_parts(size * rng.exponential(size=size.shape), terms, common=True)
+    assert (none[1] == 0).all()
+
+
 def test_parts_of_which_one_is_far_smaller():
     """|h|^2 over 14 decades: the constant part is 1e-11 of the mean of the other, and counts on most lines."""
     rng = np.random.default_rng(2)
@@ -299,3 +319,50 @@ def test_bad_arguments(h):
         jf.estimate_noise(FREQ, h, coherence=np.full(h.shape, 0.9), averages=0)
     with pytest.raises(ValueError, match="NaN or Inf in line 0"):
         jf.estimate_noise(FREQ, np.full(h.shape, np.nan))
+
+
+@pytest.mark.parametrize("is_acceleration", [False, True])
+def test_a_floor_is_constant_in_the_quantity_that_shows_it(beams, is_acceleration):
+    """Variance by entry and line against the variance that made the noise."""
+    freq, h = beams.freq, beams.gamma(beams.joint)
+    shape = (np.median(freq) / freq[:, None, None]) ** 2 if is_acceleration else 1.0
+    floor = 0.02 * np.median(abs(h), axis=0) * shape
+    rng = np.random.default_rng(3)
+    e = (rng.standard_normal((2, *h.shape, 2)) @ [1, 1j]) / np.sqrt(2)
+    found = jf.estimate_noise(freq, h * (1 + 0.02 * e[0]) + floor * e[1])
+    assert found.floor_of_acceleration == is_acceleration
+    ratio = found.variance / ((0.02 * abs(h)) ** 2 + np.square(np.broadcast_to(floor, h.shape)))
+    assert np.median(ratio) == pytest.approx(1, abs=0.1)
+    low, high = np.quantile(ratio, [0.05, 0.95])
+    assert 0.6 < low < high < 1.5
+
+
+#: Sensors and hits at nodes of a beam: neighbours, one apart, exchanged, far away.
+OTHER_POINTS = [([3, 6, 9], [4, 7, 10]), ([3, 6, 9], [3, 6, 10]), ([3, 11], [11, 3]), ([2, 5], [8, 11])]
+
+
+@pytest.mark.parametrize("level", [0.02, 0.002])
+@pytest.mark.parametrize(("sensors", "hits"), OTHER_POINTS)
+def test_a_matrix_of_other_points_is_not_taken_for_reciprocal(sensors, hits, level):
+    beam = jf.beam(
+        0.3, 12, youngs_modulus=67e9, density=2700.0, width=0.025, height=0.006, ends=("clamped", "free"),
+        loss_factor=0.01,
+    )  # fmt: skip
+    rows, columns = (beam.index(*(f"{node}:y" for node in nodes)) for nodes in (sensors, hits))
+    h = jf.pollute(beam.receptance(FREQ)[:, rows][:, :, columns], level, seed=1)
+    found = jf.estimate_noise(FREQ, h)
+    assert found.level == pytest.approx(level, rel=0.2)
+    assert found.calibration is None
+    order = np.random.default_rng(1).permutation(FREQ.size)
+    assert jf.estimate_noise(FREQ[order], h[order]).level == pytest.approx(level, rel=0.2)
+
+
+def test_differences_that_are_noise_or_gains_are_those_of_reciprocal_frfs(h):
+    """Whether they are smooth or not; few lines of other points, whose noise nothing shows, are rejected."""
+    gains = np.array([1, 1.05, 0.97, 1])[:, None]
+    for x in (jf.pollute(h, 0.02, seed=1), h * (1 + 0.02 * correlated(h.shape, 25, 3)), jf.pollute(h, 0.01) * gains):
+        own, known = jf.estimate_noise(FREQ, x), jf.estimate_noise(FREQ, x, reciprocal=True)
+        np.testing.assert_array_equal(own.variance, known.variance)
+    few = h[::60, [0, 1]][:, :, [3, 2]]
+    with pytest.raises(ValueError, match=r"h is not reciprocal\. Give reciprocal=False if responses and forces are"):
+        jf.estimate_noise(FREQ[::60], few)

@@ -96,6 +96,46 @@ def test_fits_scatter_as_predicted():
     assert 0.75 < np.std(away) < 1.25  # 80 numbers scatter by 8 %: three times that
 
 
+def default_beams() -> jf.Assembly:
+    """Beams whose models may be off, as by default."""
+    a = jf.Substructure(jf.beam(0.3, 6, ends=("clamped", "free"), **BEAM), ["7:y", "7:theta"])
+    b = jf.Substructure(jf.beam(0.2, 5, **BEAM), ["1:y", "1:theta"])
+    return jf.Assembly(a, b, jf.Joint([1e6, 1e3], [50.0, 0.1], dofs=["y", "theta"]))
+
+
+def test_errors_are_those_that_fits_state_with_errors_of_the_models():
+    """At default settings: noise estimated, models that may be off, another joint to start from."""
+    whole, freq, noise = default_beams(), np.arange(20.0, 800, 4), jf.StatedNoise(0.02, accelerance=0.02)
+    sensors, hits = ["A/3:y", "B/4:y"], ["B/2:y", "A/5:y"]
+    planned = jf.plan(whole, freq, sensors, hits, noise=noise, sensors=sensors, hits=hits).proposed
+    exact, start = whole.receptance(freq, sensors, hits), jf.Joint([5e5, 2e3], [20.0, 0.3], dofs=["y", "theta"])
+    ratios = []
+    for seed in range(3):
+        parts = np.random.default_rng(seed).standard_normal((2, *exact.shape)) * np.sqrt(
+            noise.variance(freq, exact) / 2
+        )
+        h = exact + parts[0] + 1j * parts[1]
+        fit = jf.identify_model(freq, h, jf.Assembly(whole.a, whole.b, start), sensors, hits)
+        ratios.append([fit.std_error[name] / planned.std_error[name] for name in ("k_y", "k_theta", "c_y", "c_theta")])
+    assert_allclose(np.exp(np.mean(np.log(ratios), axis=0)), 1, rtol=0.25)
+    perfect = jf.plan(beams(), freq, sensors, hits, noise=noise, sensors=sensors, hits=hits).proposed
+    assert max(planned.std_error[name] / perfect.std_error[name] for name in perfect.std_error) > 1.5
+
+
+def test_steps_and_additions_have_the_errors_of_tests_that_are_planned_as_they_are():
+    whole, freq, nodes = default_beams(), np.arange(20.0, 800, 10), ["A/3:y", "A/6:y", "B/2:y", "B/6:y"]
+    found = jf.plan(whole, freq, nodes, nodes, budget=3)
+    more = found.additions[0]
+    sensors, hits = (
+        [*own, more.dof] if more.kind == kind else list(own)
+        for kind, own in (("sensor", found.proposed.sensors), ("hit", found.proposed.hits))
+    )
+    for one, error in (((sensors, hits), more.error), ((nodes, nodes), found.everything.error)):
+        same = jf.plan(whole, freq, *one, sensors=one[0], hits=one[1]).proposed
+        assert same.error == pytest.approx(error, rel=1e-3)
+    assert more.error == min(one.error for one in found.additions)
+
+
 @pytest.mark.parametrize("criterion", ["A", "D"])
 def test_the_choice_is_that_of_all_choices(criterion):
     rng = np.random.default_rng(5)
@@ -112,6 +152,25 @@ def test_the_choice_is_that_of_all_choices(criterion):
         best = min(float(designer.loss(designer.information(Design(*one, 0.0)))) for one in every)
         assert best - 1e-9 <= design.loss < best + 0.25  # exchange of one at a time ends near the best
         assert design.loss == pytest.approx(float(designer.loss(designer.information(design))))
+
+
+def test_designs_of_equal_worth_are_taken_in_the_order_of_the_candidates():
+    """By reciprocity sensors and hits may be exchanged; rounding, which differs by processor, must not decide."""
+    rng = np.random.default_rng(3)
+    rows = rng.standard_normal((5, 5, 4, 3))
+    of_frf = np.einsum("oirp,oirq->oipq", rows, rows)
+    of_frf += of_frf.swapaxes(0, 1)
+    found = []
+    for seed in range(12):
+        rounding = 1 + 1e-9 * np.random.default_rng(seed).standard_normal((5, 5, 1, 1))
+        designer = Designer(
+            of_frf * rounding, 1e-6 * np.eye(3), criterion_of(np.arange(3), "A"), Prices(1, 1), Design((), (), np.inf)
+        )
+        designs = list(designer.designs())
+        found.append((designs, [designer.ranked(one, designer.additions(one)) for one in designs]))
+    assert all(one == found[0] for one in found)
+    first = found[0][0][0]
+    assert first.sensors <= first.hits
 
 
 def test_prices_decide_between_sensors_and_hits():

@@ -1,6 +1,7 @@
 """Pooling fits, and comparing those of several structures: what is refused, said and written."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -70,6 +71,33 @@ def test_a_trend_is_a_power_law():
     assert trend.low < 0.4 < trend.high
     assert trend.p_value < 1e-4
     assert_allclose(trend.value, 0.4, atol=0.05)
+
+
+def test_mean_and_next_assembly_state_the_number_at_which_they_hold(tmp_path):
+    torque = [5.0, 10, 20, 40] * 2
+    rng = np.random.default_rng(6)
+    fits = [fit_of(1e6 * (t / 10) ** 0.4 * np.exp(rng.normal(0, 0.02)), 20.0, 0.005) for t in torque]
+    pooled = jf.pool(fits, factors={"torque": torque}, trends=["torque"])
+    own = pooled.parameters["k_y"]
+    assert_allclose(own.at["torque"], np.sqrt(200))
+    assert_allclose(own.mean.value, 1e6 * (own.at["torque"] / 10) ** 0.4, rtol=0.03)
+    page = jf.write_pool(pooled, tmp_path / "pool.html").read_text()
+    for shown in (str(pooled), page, pool_csv(pooled)):
+        assert "torque 14.14 (geometric mean)" in shown
+    chances = [re.sub("<[^>]*>", "", cell) for cell in re.findall(r'data-label="p"[^>]*>(.*?)</td>', page)]
+    assert "&lt; 1e-4" in chances
+    assert not any("e-" in chance for chance in chances if chance != "&lt; 1e-4")
+
+
+def test_errors_that_all_fits_share_are_named():
+    rng = np.random.default_rng(12)
+    fits = [fit_of(1e6 * np.exp(rng.normal(0, 0.002)), 20.0, error=0.05) for _ in range(6)]
+    pooled = jf.pool(fits, parameters=["k_y"])
+    assert any("one error of all fits" in text for text in pooled.warnings)
+    mean = pooled.parameters["k_y"].mean
+    assert mean.high / mean.low > np.exp(2 * 1.9 * 0.05)
+    alone = jf.pool(fits, parameters=["k_y"], common=0.05).parameters["k_y"].mean
+    assert mean.high / mean.low <= alone.high / alone.low
 
 
 def test_an_outlying_assembly_is_named():

@@ -14,8 +14,8 @@ PACKAGE = Path(jointfrf.__file__).parent
 
 #: From the ground up; rooms of one floor do not know each other, a room imports what stands below its floor.
 FLOORS = (
-    {"spelling"},
-    {"errors"},
+    {"spelling", "choices"},
+    {"errors", "directions"},
     {"files"},
     {"extras", "kernel", "messages", "toml"},
     {"dofs", "parallel"},

@@ -6,7 +6,7 @@ import pytest
 import jointfrf as jf
 import six_dof_beams
 from jointfrf.frf.entry_groups import connected, entry_groups
-from jointfrf.frf.rational_fit import Entries, rational_fit, relocated
+from jointfrf.kernel.call import call_for_number
 
 FREQ = np.linspace(10, 400, 500)
 
@@ -32,35 +32,46 @@ def median_error(found, h, noise):
     return np.median(abs(found - h)) / np.median(abs(noise))
 
 
+def relocated(s, h, weight, poles, iterations):
+    """Return the least sum of squares and its poles; FRFs (n_entries, n_freq)."""
+    better = poles.astype(complex)
+    squares, _ = call_for_number("relocate_poles", (len(poles), *h.shape, iterations, 0.0, s, h, weight, better))
+    return squares, better
+
+
+def fitted(s, h, weight, poles):
+    """Return smooth FRFs, their sum of squares and the loss of each pole."""
+    smooth, loss = np.empty_like(h), np.empty(len(poles))
+    squares, _ = call_for_number("rational_fit", (len(poles), *h.shape, s, h, weight, poles, smooth, loss))
+    return smooth, squares, loss
+
+
 def test_poles_of_a_rational_function_are_found(rational):
     """From poles far from the right ones, without noise."""
     poles_hz, h = rational
     p, q = np.triu_indices(3)
-    entries = Entries(1j * FREQ / 400, h[:, p, q].T.copy(), 1 / abs(h[:, p, q].T))
-    poles = np.array([-0.01 + 1j]) * np.linspace(0.1, 0.9, 5)
-    squares, poles = relocated(entries, poles, 10, 0.0)
+    s, entries = 1j * FREQ / 400, h[:, p, q].T.copy()
+    squares, poles = relocated(s, entries, 1 / abs(entries), np.array([-0.01 + 1j]) * np.linspace(0.1, 0.9, 5), 10)
     assert squares < 1e-8
     np.testing.assert_allclose(np.sort(poles.imag) * 400, poles_hz.imag, rtol=1e-6)
     np.testing.assert_allclose(poles.real[poles.imag.argsort()] * 400, poles_hz.real, rtol=1e-4)
-    fit = rational_fit(entries, poles)
-    np.testing.assert_allclose(fit.smooth, entries.h, rtol=1e-5)
+    np.testing.assert_allclose(fitted(s, entries, 1 / abs(entries), poles)[0], entries, rtol=1e-5)
 
 
 def test_a_relocation_tells_the_squares_of_the_fit_and_a_loss_is_that_of_the_fit_without_the_pole(rational):
     _, h = rational
-    x = jf.pollute(h, 0.05, seed=1)
-    weight = np.random.default_rng(1).uniform(0.5, 2, (9, len(FREQ)))
-    entries = Entries(1j * FREQ / 400, x.reshape(len(FREQ), 9).T.copy(), weight)
+    entries = jf.pollute(h, 0.05, seed=1).reshape(len(FREQ), 9).T.copy()
+    s, weight = 1j * FREQ / 400, np.random.default_rng(1).uniform(0.5, 2, (9, len(FREQ)))
     poles = np.array([-0.02 + 1j]) * np.array([0.16, 0.33, 0.52, 0.74])
-    fit = rational_fit(entries, poles)
-    assert fit.squares == pytest.approx(relocated(entries, poles, 0, 0.0)[0], rel=1e-9)
+    smooth, squares, loss = fitted(s, entries, weight, poles)
+    assert squares == pytest.approx(relocated(s, entries, weight, poles, 0)[0], rel=1e-9)
     # another route: one dense least-squares problem an entry
-    basis = np.c_[np.ones(len(FREQ)), 1 / (entries.s[:, None] - poles)]
+    basis = np.c_[np.ones(len(FREQ)), 1 / (s[:, None] - poles)]
     for e in (0, 5):
-        c = np.linalg.lstsq(weight[e][:, None] * basis, weight[e] * entries.h[e], rcond=None)[0]
-        np.testing.assert_allclose(fit.smooth[e], basis @ c, rtol=1e-9)
-    without = rational_fit(entries, np.delete(poles, 2))
-    assert fit.loss[2] == pytest.approx(without.squares - fit.squares, rel=1e-9)
+        c = np.linalg.lstsq(weight[e][:, None] * basis, weight[e] * entries[e], rcond=None)[0]
+        np.testing.assert_allclose(smooth[e], basis @ c, rtol=1e-9)
+    without = fitted(s, entries, weight, np.delete(poles, 2))[1]
+    assert loss[2] == pytest.approx(without - squares, rel=1e-9)
 
 
 @pytest.mark.parametrize("level", [0.001, 0.02, 0.2])

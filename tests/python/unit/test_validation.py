@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
+from jointfrf.identification.validation import compare_frfs
 
 FREQ = np.linspace(0.5, 10, 200)
 A = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start")
@@ -94,3 +95,23 @@ def test_lines_that_are_not_finite():
     whole[7, 0, 0] = np.inf
     with pytest.raises(ValueError, match=r"NaN or Inf"):
         jf.validate(FREQ, whole, h_a, h_b, JOINT, [1], [0])
+
+
+def test_a_largest_peak_of_another_mode_is_named():
+    """Two modes of nearly equal peaks: with less damping of the second one, it becomes the largest."""
+    freq = np.arange(50.0, 300.0, 0.5)
+
+    def frf(second: float) -> np.ndarray:
+        modes = ((100.0, 0.01), (172.0, second))
+        return sum(f**2 / (f**2 * (1 + 1j * eta) - freq**2) for f, eta in modes)[:, None, None]
+
+    one = compare_frfs(freq, frf(0.0105), frf(0.0095), ["1:y"], ["2:y"])
+    assert one.frequency_error[0, 0] == pytest.approx(72, abs=1)
+    assert one.other_mode.all()
+    assert "in 1 FRFs the largest peak is another mode than measured, first 1:y / 2:y" in str(one)
+    same = compare_frfs(freq, frf(0.0105), 1.02 * frf(0.0104), ["1:y"], ["2:y"])
+    assert not same.other_mode.any()
+    assert "another mode" not in str(same)
+    # a shift of the one mode by two lines, with noise, is none
+    moved = compare_frfs(freq, frf(0.02), jf.pollute(np.roll(frf(0.02), 2, axis=0), 0.05, seed=1), ["1:y"], ["2:y"])
+    assert not moved.other_mode.any()
