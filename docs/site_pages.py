@@ -30,7 +30,15 @@ _ROOMS = {
 
 #: Sections of the site, and the documents of each in reading order, as files of the repository.
 _SECTIONS = {
-    "Start": ["README.md", "docs/quickstart.md", "docs/tutorial.md", "docs/coming-from.md"],
+    "Start": [
+        "README.md",
+        "docs/quickstart.md",
+        "docs/tutorial.md",
+        "docs/coming-from.md",
+        "docs/matlab.md",
+        "docs/julia.md",
+        "docs/related-tools.md",
+    ],
     "How to": [
         "docs/measured-file.md",
         "docs/checks.md",
@@ -42,6 +50,7 @@ _SECTIONS = {
         "docs/studies.md",
         "docs/report.md",
         "docs/embedding.md",
+        "docs/platforms.md",
         "docs/performance.md",
         "docs/cases.md",
     ],

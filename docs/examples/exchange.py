@@ -12,7 +12,6 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-import scipy.io
 
 import jointfrf as jf
 
@@ -59,28 +58,11 @@ print(y.shape, df_chn[0])
 # %%
 # From pyFBS
 # ----------
-# A row becomes a channel of a number and a direction, with its place, its unit vector, and its side of the joint. The
-# array needs no conversion; an array of SDynPy or MATLAB would be turned by ``numpy.moveaxis(h, -1, 0)`` before.
-
-
-def channels_of(rows, first):
-    """Channels of rows: nodes are counted from a number, so that sensors and hits keep apart."""
-    return tuple(jf.io.Channel(first + i // 3, "+" + row["Name"][-1]) for i, row in enumerate(rows))
-
-
-def places_of(rows, channels, role):
-    """Places of channels: what `jointfrf.io.read_channel_table` reads from a file."""
-    return [
-        jf.ChannelPlace(channel, "jk"[row["Grouping"] - 1], role, np.array(position), np.array(direction))
-        for channel, row, position, direction in zip(
-            channels, rows, vectors(rows, "Position"), vectors(rows, "Direction"), strict=True
-        )
-    ]
-
-
-sensors, hits = channels_of(df_chn, 101), channels_of(df_imp, 201)
-frfs = jf.io.FrfSet(freq, sensors, hits, y, "accelerance")
-places = places_of(df_chn, sensors, "response") + places_of(df_imp, hits, "excitation")
+# `jf.io.from_pyfbs` takes the array and both tables. ``Grouping`` tells the sides apart; the tables do not state
+# the unit of their positions. An array of SDynPy or MATLAB has its lines last: ``axes="out,in,freq"``.
+test = jf.io.from_pyfbs(freq, y, df_chn, df_imp, unit="m/s^2/N", position_unit="m", sides={1: "j", 2: "k"})
+frfs, places = test
+print(frfs)
 
 # %%
 # Virtual points, FRFs of their channels, a look at them, the fit: all of the path in four lines.
@@ -123,61 +105,31 @@ else:
 # %%
 # To and from SDynPy
 # ------------------
-# SDynPy holds coordinates as records of node and direction, 1 to 6 for x to theta_z, negative along -x, and FRFs with
-# the lines last. Both ways, by arrays only:
-number = {"x": 1, "y": 2, "z": 3, "theta_x": 4, "theta_y": 5, "theta_z": 6}
-word = {n: name for name, n in number.items()}
-
-
-def coordinates_of(channels):
-    """Records as a `CoordinateArray` has them."""
-    rows = [(one.node, (-1 if one.direction[0] == "-" else 1) * number[one.direction[1:]]) for one in channels]
-    return np.array(rows, dtype=[("node", "<u8"), ("direction", "i1")])
-
-
-def channels_of_records(records):
-    """Channels of such records."""
-    return tuple(
-        jf.io.Channel(int(node), ("-" if way < 0 else "+") + word[abs(int(way))]) for node, way in records.tolist()
-    )
-
-
-rows, columns = coordinates_of(frfs.responses), coordinates_of(frfs.excitations)
-ordinate = np.moveaxis(frfs.h, 0, -1)
-pairs = np.stack(np.broadcast_arrays(rows[:, None], columns[None, :]), axis=-1)
-print(ordinate.shape, pairs.shape, pairs[0, 0].tolist())
+# SDynPy has coordinates as records of node and direction, and the lines last. `jf.io.to_sdynpy` returns its structured
+# array, `jf.io.from_sdynpy` takes one; `jf.io.to_escdf` and `jf.io.from_escdf` do the same for ESCDF.
+array = jf.io.to_sdynpy(frfs)
+print(array.shape, array["coordinate"][0, 0].tolist())
 
 if importlib.util.find_spec("sdynpy"):
     import sdynpy as sdpy
 
-    held = sdpy.data_array(
-        sdpy.data.FunctionTypes.FREQUENCY_RESPONSE_FUNCTION, freq, ordinate,
-        sdpy.coordinate_array(pairs["node"], pairs["direction"]),
-    )  # fmt: skip
-    ordinate, pairs = held.ordinate, held.coordinate
-    print("held by SDynPy:", type(held).__name__, held.shape)
+    array = array.view(sdpy.data.TransferFunctionArray)
+    print("held by SDynPy:", type(array).__name__, array.shape)
 else:
     print("SDynPy is not installed")
 
-back = jf.io.FrfSet(
-    freq, channels_of_records(pairs[:, 0, 0]), channels_of_records(pairs[0, :, 1]), np.moveaxis(ordinate, -1, 0),
-    "accelerance",
-)  # fmt: skip
+back = jf.io.from_sdynpy(array, unit="m/s^2/N")
 print(back.responses == frfs.responses, back.excitations == frfs.excitations, np.array_equal(back.h, frfs.h))
 
 # %%
 # To and from MATLAB, and to any other program
 # --------------------------------------------
 # ``jf.io.write_frfs`` takes the format from the suffix: a Universal File for SDynPy and test systems, ``.npz``.
-# A ``.mat`` is written by scipy and read by `jf.io.read_frfs`, whatever its fields are called (``mapping=``); in MATLAB
-# lines are often last: ``permute(h, [3 1 2])`` before ``save``.
+# A ``.mat`` of MATLAB is read whatever its fields are called (``mapping=``), with its lines first or last.
 with tempfile.TemporaryDirectory() as folder:
     paths = [Path(folder) / f"test.{suffix}" for suffix in ("mat", "uff", "npz")]
-    names = {"responses": [str(one) for one in frfs.responses], "excitations": [str(one) for one in frfs.excitations]}
-    scipy.io.savemat(paths[0], {"freq_hz": freq, "h": frfs.h, "quantity": "accelerance", "unit": "m/s^2/N", **names})
     for path in paths:
-        if path.suffix != ".mat":
-            jf.io.write_frfs(path, frfs)
+        jf.io.write_frfs(path, frfs)
         again = jf.io.read_frfs(path)
         error = abs(again.matrix(frfs.responses, frfs.excitations) - frfs.h).max() / abs(frfs.h).max()
         print(path.suffix, again.quantity, again.h.shape, f"{error:.0e}")
