@@ -136,18 +136,16 @@ def _section(root: Path, title: str, names: list[str]) -> str:
 
 def _python_reference() -> str:
     """Return the list of all public names, by package."""
-    listed: dict[str, list[str]] = {title: [] for title in [*_PACKAGES.values(), "Errors, names and other things"]}
+    by_title: dict[str, list[str]] = {title: [] for title in [*_PACKAGES.values(), "Errors, names and other things"]}
     for name in jf.__all__:
-        module = (
-            getattr(getattr(jf, name), "__module__", "jointfrf.").removeprefix("jointfrf.").removeprefix("workbench.")
-        )
-        listed[_PACKAGES.get(module.split(".")[0], "Errors, names and other things")].append(f"jointfrf.{name}")
-    listed["Files: jointfrf.io"] = [f"jointfrf.io.{name}" for name in jf.io.__all__]
+        module = getattr(getattr(jf, name), "__module__", "jointfrf.").replace("workbench.", "")
+        by_title[_PACKAGES.get(module.split(".")[1], "Errors, names and other things")].append(f"jointfrf.{name}")
+    by_title["Files: jointfrf.io"] = [f"jointfrf.io.{name}" for name in jf.io.__all__]
     text = [
         "# Python reference",
         "Every public name, with shapes, units, errors and equations. By task: [Python](../../python.md).",
     ]
-    for title, names in listed.items():
+    for title, names in by_title.items():
         if names:
             listed = "\n".join(sorted(names, key=str.lower))
             text += [
