@@ -20,10 +20,10 @@ from msgspec import structs
 
 import jointfrf as jf
 from command import run_command
-from jointfrf.cases.catalogue import find_case, read_case
-from jointfrf.cases.known_joint.exact import exact_frfs
-from jointfrf.cases.known_joint.realisations import estimate_realisations
-from jointfrf.studies.summary import ParameterSummary, study_figures
+from jointfrf.workbench.cases.catalogue import find_case, read_case
+from jointfrf.workbench.cases.known_joint.exact import exact_frfs
+from jointfrf.workbench.cases.known_joint.realisations import estimate_realisations
+from jointfrf.workbench.studies.summary import ParameterSummary, study_figures
 from studied_case import CASE, DESIGN, WORDS, N, broken_off, doubled, same
 
 
