@@ -671,8 +671,7 @@ def test_a_file_that_is_found_writes_nothing(tmp_path, monkeypatch, said, key):
 
 
 def test_a_file_that_is_found_names_no_executor(tmp_path):
-    """Dask takes pickles from whoever it connects to."""
-    Path("jointfrf.toml").write_text('[study]\nexecutor = "dask:tcp://127.0.0.1:9"\n')
+    Path("jointfrf.toml").write_text('[study]\nexecutor = "mpi"\n')
     result = run_command("study", "4.2", "--realisations", "2")
     assert result.returncode == 1
     assert "[study]: executor: not taken from a jointfrf.toml" in result.stderr

@@ -14,7 +14,7 @@ import tarfile
 import tomllib
 
 import pytest
-import yaml  # which dask brings
+import yaml
 
 import jointfrf
 from jointfrf import _kernel

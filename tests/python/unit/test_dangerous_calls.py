@@ -53,15 +53,11 @@ KNOWN = {
     (
         "parallel/line_arrays.py",
         "import_extra",
-    ): "zarr, h5py: arrays that a caller has opened, opened again by a worker",
+    ): "h5py: arrays that a caller has opened, opened again by a worker",
     ("parallel/line_arrays.py", "memmap"): "numbers of a file that a caller has mapped, mapped again by a worker",
     ("workbench/studies/result.py", "import_extra"): "pyarrow, which writes",
     ("workbench/cli/study.py", "get_reusable_executor"): "processes of this machine, started in a safe environment",
     ("workbench/cli/study.py", "MPIPoolExecutor"): "processes that mpiexec has started",
-    (
-        "workbench/cli/study.py",
-        "Client",
-    ): "connects to the Dask cluster whose address the command line names",
     ("workbench/cli/study.py", "concurrent.futures"): "threads",
     ("workbench/cli/study.py", "ThreadPoolExecutor"): "threads",
     ("workbench/cases/workers.py", "concurrent.futures"): "the type of futures, and errors of processes",

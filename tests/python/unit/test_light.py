@@ -16,7 +16,7 @@ from packages import package_of
 
 #: Packages of single tasks; those in ALL come with the extra `all`.
 ALL = ("h5py", "jinja2", "matplotlib", "shtab", "pyarrow")
-EXTRAS = (*ALL, "zarr", "loky", "distributed", "mpi4py")
+EXTRAS = (*ALL, "loky", "mpi4py")
 HEAVY = {"numpy", "scipy", "matplotlib", "jinja2", "h5py", "shtab", "importlib.metadata", "jointfrf._kernel"}
 #: What may be imported before the arguments of a command are parsed.
 LIGHT = {"choices", "directions", "extras", "laws", "messages", "spelling", "workbench", "workbench.cli"}

@@ -127,8 +127,5 @@ def _started(word: str, jobs: int | None) -> Iterator[AnyExecutor | None]:
             )
         with futures.MPIPoolExecutor() as pool:
             yield pool
-    elif word.startswith("dask:"):
-        with import_extra("distributed").Client(word.removeprefix("dask:"), set_as_default=False) as client:
-            yield client.get_executor()
     else:
         yield None

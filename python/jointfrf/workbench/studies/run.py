@@ -158,7 +158,7 @@ def study(
     part : range, optional
         Compute these realisations only, for a job of many: ``range(200, 300)``. See `merge_studies`.
     executor : Executor or callable, optional
-        Any executor of `concurrent.futures`, of which only `submit` is used: threads, loky, Dask
+        Any executor of `concurrent.futures`, of which only `submit` is used: threads, loky
         (``client.get_executor()``), MPI (``mpi4py.futures.MPIPoolExecutor()``); or what makes one, such as
         ``loky.get_reusable_executor``, which is called again where the executor breaks. By default processes of this
         machine, of which one that dies costs its chunk only.

@@ -13,7 +13,7 @@ from jointfrf.workbench.cli.usage import positive
 __all__ = ["add_arguments"]
 
 #: What --executor takes.
-_EXECUTORS = ("processes", "threads", "loky", "mpi", "dask:ADDRESS")
+_EXECUTORS = ("processes", "threads", "loky", "mpi")
 
 
 def add_arguments(parser: CommandParser) -> None:
@@ -63,7 +63,7 @@ def _whole(word: str) -> int:
 
 
 def _executor(word: str) -> str:
-    if word not in _EXECUTORS[:-1] and not (word.startswith("dask:") and len(word) > len("dask:")):
+    if word not in _EXECUTORS:
         raise argparse.ArgumentTypeError(f"unknown executor {word!r}; use one of {', '.join(_EXECUTORS)}")
     return word
 
