@@ -172,12 +172,17 @@ def exact(trial: CalibrationTrial) -> tuple[np.ndarray, np.ndarray]:
     return models.FREQ, models.exact(models.ModelTrial(trial.fit))
 
 
-def fitted(trial: CalibrationTrial, place: int, number: int) -> jf.Fit:
-    """Return the fit of one draw, with noise and calibration unknown."""
+def measured(trial: CalibrationTrial, place: int, number: int) -> np.ndarray:
+    """Return the FRFs of one draw."""
     freq, h = exact(trial)
     rng = np.random.default_rng([1000 * place + number, 30])
     noisy = h * trial.factor(rng, freq, h.shape)
-    noisy = noisy + trial.level * h * _normal(rng, h.shape)
+    return noisy + trial.level * h * _normal(rng, h.shape)
+
+
+def fitted(trial: CalibrationTrial, place: int, number: int) -> jf.Fit:
+    """Return the fit of one draw, with noise and calibration unknown."""
+    freq, noisy = exact(trial)[0], measured(trial, place, number)
     if trial.fit == "joint":
         return jf.identify(freq, noisy, ["y", "theta"], damping="viscous")
     channels = models.CHANNELS[trial.fit]

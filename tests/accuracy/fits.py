@@ -71,7 +71,7 @@ def one_draw(trial: Trial, seed: int, known: bool = False) -> Draw:
         variance = trial.level**2 * sizes_of(trial, exact, freq) ** 2
         # FRFs that are zero have no relative noise, and a fit no variance of zero
         variance = np.maximum(variance, variance[variance > 0].min())
-    start = time.perf_counter()
+    start = time.process_time()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -80,9 +80,9 @@ def one_draw(trial: Trial, seed: int, known: bool = False) -> Draw:
             )
         except ValueError:
             # No joint was found, and that is said.
-            return Draw({}, {}, time.perf_counter() - start)
+            return Draw({}, {}, time.process_time() - start)
         intervals = fit.confidence_interval(0.95)
-    return Draw(fit.value, intervals, time.perf_counter() - start)
+    return Draw(fit.value, intervals, time.process_time() - start)
 
 
 def sizes_of(trial: Trial, gamma: np.ndarray, freq: np.ndarray) -> np.ndarray:

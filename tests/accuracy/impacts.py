@@ -23,6 +23,8 @@ LOSS, AIR = 0.005, 8.0
 K_TRUE, C_TRUE = (4e6, 8e3), (80.0, 2.0)
 #: Samples per second, and how many times faster the structure is computed.
 RATE, OVER = 4096.0, 16
+#: Half the length of the filter before sampling, in samples: that of scipy.signal.decimate.
+LENGTH = 10
 
 
 def timoshenko(
@@ -180,31 +182,34 @@ class Analyser:
 def _records(
     own: Structure, rows: np.ndarray, into: np.ndarray, analyser: Analyser, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return force (n_samples,) and accelerations (n_samples, n_rows) of one impact, exact, then sampled."""
-    n = round(analyser.seconds * RATE) * OVER
-    t = np.arange(n) / (RATE * OVER)
+    """Return force (n_samples,) and accelerations (n_samples, n_rows) of one impact, filtered and sampled."""
+    n = round(analyser.seconds * RATE)
     width, start = rng.uniform(0.9e-3, 1.4e-3), analyser.before + rng.uniform(0, 1e-3)
     peak = rng.uniform(60, 140)
-    rate, inside = 2 * np.pi / width, (t >= start) & (t < start + width)
-    after = t >= start + width
-    force = np.where(inside, peak / 2 * (1 - np.cos(rate * (t - start))), 0)
-    acceleration = np.zeros((n, len(rows)))
-    for pole, shape in zip(own.poles, own.shapes.T, strict=True):
-        # v is the rate of q, the integral of exp(pole (t - s)) force(s) over the pulse so far. The residues of all
-        # modes add up to zero, so that accelerations are the sum of residue pole v.
-        x, square = t - start, pole**2 + rate**2
-        v, own = np.zeros(n, complex), x[inside]
-        grown = np.exp(pole * own)
-        of_cosine = rate**2 * np.cos(rate * own) + pole * rate * np.sin(rate * own) + pole**2 * grown
-        v[inside] = peak / 2 * (grown - of_cosine / square)
-        first = int(np.flatnonzero(after)[0])
-        last = min(n, int(first + 40 / -pole.real * RATE * OVER) + 2)
-        end = peak / 2 * (np.exp(pole * width) - 1) * rate**2 / square
-        v[first:last] = end * np.exp(pole * (x[first:last] - width))
-        residue = pole * (rows @ shape) * (shape @ into)
-        acceleration[:last] += 2 * np.outer(v[:last], residue).real
-    force, acceleration = (signal.decimate(one, OVER, ftype="fir", axis=0) for one in (force, acceleration))
-    return force, acceleration
+    # Up to this sample the filter touches the pulse: samples of the structure are computed there. Then it decays.
+    first = min(int(np.ceil((start + width) * RATE)) + LENGTH + 1, n)
+    x = np.arange((first + LENGTH) * OVER) / (RATE * OVER) - start
+    inside, after = (x >= 0) & (x < width), x >= width
+    rate = 2 * np.pi / width
+    force = np.where(inside, peak / 2 * (1 - np.cos(rate * x)), 0)
+    # v is the rate of q, the integral of exp(pole (t - s)) force(s) over the pulse so far. The residues of all modes
+    # add up to zero, so that accelerations are the sum of residue pole v.
+    poles, pulse = own.poles, x[inside, None]
+    square = poles**2 + rate**2
+    of_cosine = rate**2 * np.cos(rate * pulse) + poles * rate * np.sin(rate * pulse) + poles**2 * np.exp(poles * pulse)
+    end = peak / 2 * (np.exp(poles * width) - 1) * rate**2 / square
+    v = np.zeros((x.size, poles.size), complex)
+    v[inside] = peak / 2 * (np.exp(poles * pulse) - of_cosine / square)
+    v[after] = end * np.exp(poles * (x[after, None] - width))
+    residues = 2 * poles * (rows @ own.shapes) * (into @ own.shapes)
+    force, near = (signal.decimate(one, OVER, ftype="fir", axis=0)[:first] for one in (force, (v @ residues.T).real))
+    # The filter of `decimate` about the first sample of the decay, and about each one that follows.
+    taps = np.arange(first - LENGTH, first + LENGTH + 0.5 / OVER, 1 / OVER) / RATE - start - width
+    filtered = signal.firwin(taps.size, 1 / OVER, window="hamming") @ np.exp(poles * taps[:, None])
+    step = int(np.sqrt(n)) + 1
+    fine, coarse = (np.exp(poles * own[:, None] / RATE) for own in (np.arange(step), np.arange(0, n - first, step)))
+    decay = ((end * filtered * coarse)[:, None] * fine).reshape(-1, poles.size)[: n - first]
+    return np.append(force, np.zeros(n - first)), np.concatenate([near, (decay @ residues.T).real])
 
 
 def measured(

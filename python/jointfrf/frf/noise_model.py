@@ -414,7 +414,11 @@ def _settled(
         steps = abs(np.log(variance[:, shown] / before[:, shown]))
         settled = bool((steps < np.log(_SETTLED)).mean() > _SETTLED_SHARE)
         known = None if differences is None else inflation
-        smooth = lines.smoothed(variance, known, 0 if settled else _patience(differences), smooth.poles)
+        after = lines.smoothed(variance, known, 0 if settled else _patience(differences), smooth.poles)
+        # Strong correlation of lines makes poles expensive: without one that is needed, the residual is no noise.
+        if after.level > max(_UNSEEN, smooth.level):
+            break
+        smooth = after
         if settled:
             break
     return _model(lines.h, smooth, given, inflation or 1.0, differences, robust=False)

@@ -1,5 +1,6 @@
 """Noise of measured FRFs from the FRFs themselves."""
 
+import calibration
 import numpy as np
 import pytest
 
@@ -118,6 +119,16 @@ def garbage(h, lines, seed, *, entries=None):
     at = np.ix_(lines, *([i] for i in entries)) if entries else lines
     x[at] = e[:, entries[0], entries[1]][:, None, None] if entries else e
     return x
+
+
+def test_correlation_does_not_remove_poles_that_the_frfs_need():
+    """Noise correlated over 50 lines makes a pole so expensive that one was dropped, and what it left became noise."""
+    trial = calibration.CalibrationTrial("joint", "3 % correlated over 50 lines")
+    freq, exact = calibration.exact(trial)
+    h = calibration.measured(trial, 12, 20)
+    model = jf.estimate_noise(freq, h, reciprocal=True)
+    assert np.median(abs(model.smooth.h - exact) / abs(exact)) < 0.03
+    assert model.level < 0.1
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
