@@ -300,6 +300,11 @@ contains
 
     h(:n_a, :n_a) = h_a
     h(n_a + 1:, n_a + 1:) = h_b
+    if (min(n_a, n_b, n_j) == 0) then                ! no product; each substructure has all joint DOFs
+      h(:n_a, n_a + 1:) = 0
+      h(n_a + 1:, :n_a) = 0
+      return
+    end if
     call take_columns(transposed, h_a, dofs_a, columns)
     call add_product(n_a, 1, n_a, 1, -1.0_dp, 1.0_dp)
     call add_product(n_a, 1, n_b, n_a + 1, 1.0_dp, 0.0_dp)

@@ -80,8 +80,8 @@ contains
     if (.not. all_finite(b)) info = line_overflow
   end subroutine solve_line
 
-  !> Reciprocal condition number from LU factors: by one solution where it is large, else of the inverse while that is
-  !> cheap, else LAPACK's estimate.
+  !> Reciprocal condition number from LU factors: of the inverse while that is cheap, else LAPACK's estimate; where an
+  !> estimate will do and it is large, by one solution.
   subroutine condition(norm, factors, pivot, space, rcond)
     real(dp), intent(in) :: norm
     complex(dp), contiguous, intent(in) :: factors(:, :)
@@ -96,7 +96,8 @@ contains
     n = size(factors, 1, kind=blas_ip)
     before = space%used
     call take_for_condition(int(n), space, inverse, work, real_work)
-    call condition_by_solution(norm, factors, pivot, work(:, 1), rcond)
+    rcond = 0.0_dp
+    if (space%estimates) call condition_by_solution(norm, factors, pivot, work(:, 1), rcond)
     if (rcond <= well_conditioned .and. n <= exact_condition) then
       inverse = factors
       call zgetri(n, inverse, n, pivot, work, size(work, kind=blas_ip), ignored)
