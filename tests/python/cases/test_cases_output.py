@@ -67,7 +67,7 @@ def ran(tmp_path_factory):
         outputs[case.name] = run_case(case, *arguments, **options)
         return outputs[case.name]
 
-    words = (chain, beams, wrong, behind, "--realisations", "4", "--jobs", "2", "--out", folder)
+    words = (chain, beams, wrong, behind, "--realisations", "4", "--jobs", "2", "--png", "--out", folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("jointfrf.cli.run.run_case", kept)
         patch.setattr("jointfrf.cases.catalogue.draw", DrawSome(DRAWN))
