@@ -224,7 +224,7 @@ def test_cases_of_one_command_are_told_in_their_order(ran):
 def test_tables_are_told_before_figures_are_drawn(tmp_path, monkeypatch):
     shown = []
 
-    def stopped(figure):
+    def stopped(figure, png):
         raise RuntimeError(f"{len(shown)} shown")
 
     monkeypatch.setattr("jointfrf.cases.catalogue.draw", stopped)
