@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "python" / "support"))
 
 from browser import started_browser  # noqa: E402
-from jointfrf.cli.main import main  # noqa: E402
+from jointfrf.workbench.cli.main import main  # noqa: E402
 
 
 class Picture(NamedTuple):

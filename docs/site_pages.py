@@ -7,8 +7,8 @@ from pathlib import Path
 
 import jointfrf as jf
 
-#: Rooms in the order in which a user meets them, with what a reader looks for there.
-_ROOMS = {
+#: Packages in the order in which a user meets them, and headings of the reference.
+_PACKAGES = {
     "identification": "From FRFs to a joint",
     "channels": "From channels to joint DOFs, and what is wrong with them",
     "messages": "Findings",
@@ -135,17 +135,17 @@ def _section(root: Path, title: str, names: list[str]) -> str:
 
 
 def _python_reference() -> str:
-    """Return the list of all public names, by room."""
-    rooms: dict[str, list[str]] = {title: [] for title in [*_ROOMS.values(), "Errors, names and other things"]}
+    """Return the list of all public names, by package."""
+    by_title: dict[str, list[str]] = {title: [] for title in [*_PACKAGES.values(), "Errors, names and other things"]}
     for name in jf.__all__:
-        room = getattr(jf, name).__module__.split(".")[1] if hasattr(getattr(jf, name), "__module__") else ""
-        rooms[_ROOMS.get(room, "Errors, names and other things")].append(f"jointfrf.{name}")
-    rooms["Files: jointfrf.io"] = [f"jointfrf.io.{name}" for name in jf.io.__all__]
+        module = getattr(getattr(jf, name), "__module__", "jointfrf.").replace("workbench.", "")
+        by_title[_PACKAGES.get(module.split(".")[1], "Errors, names and other things")].append(f"jointfrf.{name}")
+    by_title["Files: jointfrf.io"] = [f"jointfrf.io.{name}" for name in jf.io.__all__]
     text = [
         "# Python reference",
         "Every public name, with shapes, units, errors and equations. By task: [Python](../../python.md).",
     ]
-    for title, names in rooms.items():
+    for title, names in by_title.items():
         if names:
             listed = "\n".join(sorted(names, key=str.lower))
             text += [

@@ -212,7 +212,7 @@ def all_pages() -> dict[str, Page]:
             pages |= read_page(path)
     for path in sorted((ROOT / PACKAGE).rglob("*.py")):
         inside = path.relative_to(ROOT / PACKAGE).parts
-        package = f"{PACKAGE}/{inside[0]}" if len(inside) > 1 else PACKAGE
+        package = "/".join((PACKAGE, *inside[:-1][: 2 if inside[0] == "workbench" else 1]))
         for page in _module_pages(path.read_text(encoding="utf-8")):
             pages.setdefault(f"{package} {page.kind}", Page(page.kind, [])).passages.extend(page.passages)
     return {name: page for name, page in pages.items() if page.passages}

@@ -11,7 +11,7 @@ import numpy as np
 
 import jointfrf as jf
 from jointfrf.io import Channel, FrfSet, write_uff
-from jointfrf.solids.solid import Patch, SolidModel, solid_model
+from jointfrf.workbench.solids.solid import Patch, SolidModel, solid_model
 
 DOFS = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
 #: Where the bolts are along z, m; the plates lie on each other at y = 3 mm, plate A below.

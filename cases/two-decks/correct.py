@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import jointfrf as jf
-from jointfrf.io.fe.nodes import read_nodes
+from jointfrf.workbench.fe.nodes import read_nodes
 
 #: A pole of a mode has less damping than this; those of noise and of modes beyond the band more.
 MODE = 0.01

@@ -7,8 +7,8 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
-#: Rooms that are reached as attributes, as in ``jointfrf.io.read_uff``.
-_ROOMS = ("io", "report", "solids")
+#: Packages that are reached as attributes, as in ``jointfrf.io.read_uff``, and their modules.
+_PACKAGES = {"io": "jointfrf.io", "report": "jointfrf.workbench.report", "solids": "jointfrf.workbench.solids"}
 
 
 @cache
@@ -17,14 +17,14 @@ def _places() -> dict[str, str]:
     import ast
 
     stub = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
-    imports = [node for node in ast.parse(stub).body if isinstance(node, ast.ImportFrom) and node.module != __name__]
-    return {alias.name: node.module for node in imports if node.module for alias in node.names}
+    imports = [node for node in ast.parse(stub).body if isinstance(node, ast.ImportFrom)]
+    return {one.name: node.module for node in imports if node.module for one in node.names if one.name not in _PACKAGES}
 
 
 def __getattr__(name: str) -> object:
     """Import a public name when it is asked for: what needs scipy takes its time to import."""
-    if name in _ROOMS:
-        return import_module(f"{__name__}.{name}")
+    if name in _PACKAGES:
+        return import_module(_PACKAGES[name])
     if name == "__version__":
         value: object = import_module("jointfrf.kernel.call").VERSION
     elif name == "__all__":
@@ -38,4 +38,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_ROOMS, *_places(), "__all__", "__version__"})
+    return sorted({*globals(), *_PACKAGES, *_places(), "__all__", "__version__"})

@@ -1,15 +1,5 @@
 # The public names and where they stand: `__init__.py` imports each when it is used, and type checkers read this.
 from jointfrf import io as io
-from jointfrf import report as report
-from jointfrf import solids as solids
-from jointfrf.amplitude.amplitude_laws import AmplitudeLawFit, AmplitudeLawFits, fit_amplitude_laws
-from jointfrf.amplitude.backbone import Backbone, backbone_levels
-from jointfrf.amplitude.decay import DecayRecord, ModalDecay, decay_of_mode
-from jointfrf.amplitude.decay_levels import decay_levels
-from jointfrf.amplitude.levels import JointLevel, JointLevels, levels
-from jointfrf.amplitude.lines import Drive
-from jointfrf.assembly_file.measured import MeasuredAssembly, measured_assembly
-from jointfrf.assembly_file.read import AssemblyPart, read_part
 from jointfrf.channels.check.check import check_frfs
 from jointfrf.channels.check.result import FrfCheck
 from jointfrf.channels.joint_channels import ChannelAgreement, JointChannels, SideAgreement, joint_channels
@@ -89,36 +79,6 @@ from jointfrf.models.receptance import ReceptanceInfo, receptance
 from jointfrf.models.regions import NodeRegion, add_regions
 from jointfrf.parallel.pool import BrokenPoolError
 from jointfrf.parallel.sweep import SweepPlan, plan_sweep, sweep
-from jointfrf.planning.assemblies import assemblies_needed, expected_half_width
-from jointfrf.planning.joint_frfs import JointFrfPlan, plan_joint_frfs
-from jointfrf.planning.plan import MeasurementPlan, plan
-from jointfrf.pooling.parameter import PooledParameter
-from jointfrf.pooling.pool import PooledFits, pool
-from jointfrf.pooling.transfer import Transfer, transfer
-from jointfrf.report.fit import plot
-from jointfrf.report.fit_page import write_report
-from jointfrf.report.levels_page import write_levels
-from jointfrf.report.plan_page import write_plan
-from jointfrf.report.pool_page import write_pool
-from jointfrf.solids.bolted_lap import (
-    PROOF_STRENGTH,
-    STRESS_AREA,
-    Bolt,
-    BoltedLap,
-    LapDivisions,
-    bolted_lap,
-    preload_force,
-)
-from jointfrf.solids.brick import Material, assemble_bricks, brick_quality, element_matrices
-from jointfrf.solids.brick_beam import Hole, brick_beam
-from jointfrf.solids.contact import ContactLaw
-from jointfrf.solids.mesh import Mesh, interpolation
-from jointfrf.solids.preload import PreloadedLap, preload
-from jointfrf.solids.solid import Patch, SolidModel, solid_model
-from jointfrf.studies.design import StudyDesign
-from jointfrf.studies.result import StudyResult, read_study
-from jointfrf.studies.run import merge_studies, study
-from jointfrf.studies.summary import ParameterSummary
 from jointfrf.substructuring.bodies import BodyLink, FreeBody, couple_bodies
 from jointfrf.substructuring.compliance import (
     MultiPointJoint,
@@ -131,6 +91,46 @@ from jointfrf.substructuring.compliance import (
 from jointfrf.substructuring.coupling import couple, semm, semm_standard_error
 from jointfrf.substructuring.methods import decouple
 from jointfrf.substructuring.modification import find_modification, inverse_substructuring, ismm, modify
+from jointfrf.workbench import report as report
+from jointfrf.workbench import solids as solids
+from jointfrf.workbench.amplitude.amplitude_laws import AmplitudeLawFit, AmplitudeLawFits, fit_amplitude_laws
+from jointfrf.workbench.amplitude.backbone import Backbone, backbone_levels
+from jointfrf.workbench.amplitude.decay import DecayRecord, ModalDecay, decay_of_mode
+from jointfrf.workbench.amplitude.decay_levels import decay_levels
+from jointfrf.workbench.amplitude.levels import JointLevel, JointLevels, levels
+from jointfrf.workbench.amplitude.lines import Drive
+from jointfrf.workbench.assembly_file.measured import MeasuredAssembly, measured_assembly
+from jointfrf.workbench.assembly_file.read import AssemblyPart, read_part
+from jointfrf.workbench.planning.assemblies import assemblies_needed, expected_half_width
+from jointfrf.workbench.planning.joint_frfs import JointFrfPlan, plan_joint_frfs
+from jointfrf.workbench.planning.plan import MeasurementPlan, plan
+from jointfrf.workbench.pooling.parameter import PooledParameter
+from jointfrf.workbench.pooling.pool import PooledFits, pool
+from jointfrf.workbench.pooling.transfer import Transfer, transfer
+from jointfrf.workbench.report.fit import plot
+from jointfrf.workbench.report.fit_page import write_report
+from jointfrf.workbench.report.levels_page import write_levels
+from jointfrf.workbench.report.plan_page import write_plan
+from jointfrf.workbench.report.pool_page import write_pool
+from jointfrf.workbench.solids.bolted_lap import (
+    PROOF_STRENGTH,
+    STRESS_AREA,
+    Bolt,
+    BoltedLap,
+    LapDivisions,
+    bolted_lap,
+    preload_force,
+)
+from jointfrf.workbench.solids.brick import Material, assemble_bricks, brick_quality, element_matrices
+from jointfrf.workbench.solids.brick_beam import Hole, brick_beam
+from jointfrf.workbench.solids.contact import ContactLaw
+from jointfrf.workbench.solids.mesh import Mesh, interpolation
+from jointfrf.workbench.solids.preload import PreloadedLap, preload
+from jointfrf.workbench.solids.solid import Patch, SolidModel, solid_model
+from jointfrf.workbench.studies.design import StudyDesign
+from jointfrf.workbench.studies.result import StudyResult, read_study
+from jointfrf.workbench.studies.run import merge_studies, study
+from jointfrf.workbench.studies.summary import ParameterSummary
 
 __all__ = [
     "PROOF_STRENGTH",

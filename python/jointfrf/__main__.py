@@ -18,7 +18,7 @@ if (
 def main() -> int:
     """Run the command line; returns the exit status, 130 after Ctrl-C."""
     try:
-        from jointfrf.cli.main import main as run
+        from jointfrf.workbench.cli.main import main as run
     except KeyboardInterrupt:
         print("jointfrf: error: interrupted", file=sys.stderr)
         return 130

@@ -38,7 +38,7 @@ Arrangement = Literal["full", "one-at-a-time"]
 POWER_OF_I_OMEGA = {"receptance": 0, "mobility": 1, "accelerance": 2}
 #: Laws over amplitude.
 AMPLITUDE_LAWS = ("constant", "power", "jenkins", "iwan", "bouc-wen")
-#: The kinds of cases, each a package of `jointfrf.cases`; the first is that of a case that names none.
+#: The kinds of cases, each a package of `jointfrf.workbench.cases`; the first is that of a case that names none.
 CASE_KINDS = ("known-joint", "bolted-lap", "modelled-joint")
 #: The fields of `jointfrf.io.FrfMapping`.
 MAPPING_FIELDS = (

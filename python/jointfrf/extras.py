@@ -29,9 +29,7 @@ _EXTRAS = {
     "pymetis": ("orders of elimination by METIS", "metis"),
     "pypardiso": ("factors by PARDISO", "pardiso"),
     "pyarrow": ("Parquet files", "parquet"),
-    "zarr": ("Zarr arrays", "zarr"),
     "loky": ("processes of loky", "loky"),
-    "distributed": ("Dask clusters", "dask"),
     "mpi4py": ("MPI pools", "mpi"),
     "shtab": ("completions for shells", "completion"),
 }

@@ -11,8 +11,8 @@ from scipy.linalg import eigh
 
 import jointfrf as jf
 from jointfrf.dofs import DIRECTIONS
-from jointfrf.solids.mesh import Mesh
-from jointfrf.solids.solid import mean_motion, solid_model
+from jointfrf.workbench.solids.mesh import Mesh
+from jointfrf.workbench.solids.solid import mean_motion, solid_model
 
 __all__ = ["Body", "ModalModel", "Pair", "pair"]
 

@@ -23,10 +23,10 @@ from fits import _groups
 
 import jointfrf as jf
 from cramer_rao import cramer_rao
-from jointfrf.cases.catalogue import find_case, read_case
-from jointfrf.cases.known_joint.exact import exact_frfs
-from jointfrf.cases.known_joint.realisations import means_over_bands
 from jointfrf.identification.manifold.coordinates import joint_terms
+from jointfrf.workbench.cases.catalogue import find_case, read_case
+from jointfrf.workbench.cases.known_joint.exact import exact_frfs
+from jointfrf.workbench.cases.known_joint.realisations import means_over_bands
 from model_bound import model_bound
 
 CASES = ("3.1", "3.2", "3.3", "4.3.1")

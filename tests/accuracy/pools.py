@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jointfrf.pooling.random_effects import RandomEffects
+from jointfrf.workbench.pooling.random_effects import RandomEffects
 
 
 @dataclass(frozen=True)

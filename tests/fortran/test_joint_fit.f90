@@ -87,6 +87,7 @@ contains
       h(i, i, :) = h(i, i, :) + 2
       q(i, i, :) = q(i, i, :) + 0.5_dp
     end do
+    allocate (s%smooth(2*n, 2*n, n_freq), s%measured(2*n, 2*n, n_freq))
     s%smooth = frfs(s, h, q, compliance(s, coordinates(s, s%value)))
     e = random_lines(2*n, 2*n, n_freq)
     if (reciprocal) e = 0.5_dp*(e + transposed(e))

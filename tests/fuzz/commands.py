@@ -15,9 +15,9 @@ from scipy.sparse import coo_array
 
 from frf_files import frf_set
 from jointfrf import Joint, write_joint
-from jointfrf.cli.main import main
-from jointfrf.cli.parser import COMMANDS, CommandParser, command_parser
 from jointfrf.io import write_csv, write_npz, write_uff
+from jointfrf.workbench.cli.main import main
+from jointfrf.workbench.cli.parser import COMMANDS, CommandParser, command_parser
 
 from .part import BrokenError
 

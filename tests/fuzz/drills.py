@@ -48,7 +48,7 @@ for k in range(1, n):
 #: Starts cases in two processes, as `jointfrf run --jobs 2` does, and says which they are.
 _RUNNER = """
 import sys
-from jointfrf.cli.main import main
+from jointfrf.workbench.cli.main import main
 if __name__ == "__main__":
     sys.exit(main(["run", "3.1-discrete", "--jobs", "2", "--out", sys.argv[1], "--realisations", "100000"]))
 """

@@ -17,8 +17,8 @@ from filelock import FileLock
 
 import jointfrf as jf
 from installed_library import installed_library  # noqa: F401
-from jointfrf.cases import catalogue
-from jointfrf.cases.known_joint.compute import KnownJointResult
+from jointfrf.workbench.cases import catalogue
+from jointfrf.workbench.cases.known_joint.compute import KnownJointResult
 from thinned_cases import DrawSome, compute_thinned
 
 

@@ -24,14 +24,11 @@ class Lines(ABC):
     Attributes
     ----------
     shape : tuple of int
-    step : int
-        Lines that must be written together.
     place : Path or None
-        The file or folder that holds it; None in memory.
+        The file that contains it; None in memory.
     """
 
     shape: tuple[int, ...]
-    step: int = 1
     place: Path | None = None
     #: Whether tasks write their results themselves; otherwise they are sent back.
     is_written_by_tasks: ClassVar[bool] = False
@@ -96,26 +93,6 @@ class MappedLines(Lines):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ZarrLines(Lines):
-    """A Zarr array in a folder: each task opens it."""
-
-    root: Path
-    path: str
-    is_written_by_tasks: ClassVar[bool] = True
-
-    def _open(self, mode: str) -> Any:
-        return import_extra("zarr").open_array(str(self.root), path=self.path, mode=mode)
-
-    def read(self, lines: slice) -> NDArray[Any]:
-        """Read lines."""
-        return np.asarray(self._open("r")[lines])
-
-    def write(self, lines: slice, values: NDArray[Any]) -> None:
-        """Write lines."""
-        self._open("r+")[lines] = values
-
-
-@dataclass(frozen=True, kw_only=True)
 class Hdf5Lines(Lines):
     """A dataset of an HDF5 file that is only read: each task opens the file."""
 
@@ -135,7 +112,7 @@ def lines_of(name: str, array: ArrayLike, *, is_result: bool = False) -> Lines:
     ----------
     name : str
         Of the argument, for messages.
-    array : array_like, numpy.memmap, zarr.Array or h5py.Dataset
+    array : array_like, numpy.memmap or h5py.Dataset
     is_result : bool
         Whether results are written into it.
 
@@ -147,9 +124,9 @@ def lines_of(name: str, array: ArrayLike, *, is_result: bool = False) -> Lines:
         It has no axis of lines, masked entries, or cannot be written.
     """
     package = type(array).__module__.partition(".")[0]
-    if is_result and package not in ("zarr", "h5py") and not isinstance(array, np.ndarray):
+    if is_result and package != "h5py" and not isinstance(array, np.ndarray):
         raise TypeError(f"{name} is a {type(array).__name__}; give an array that results can be written into")
-    found = _zarr(array) if package == "zarr" else _hdf5(array, is_result) if package == "h5py" else _numpy(name, array)
+    found = _hdf5(array, is_result) if package == "h5py" else _numpy(name, array)
     if isinstance(array, np.ndarray) and is_result and not array.flags.writeable:
         raise ValueError(f"{name} is open for reading only; open it for writing")
     if not found.shape:
@@ -169,18 +146,6 @@ def _numpy(name: str, array: ArrayLike) -> Lines:
         )
     values = as_array(name, array)
     return MemoryLines(shape=values.shape, array=values)
-
-
-def _zarr(array: Any) -> Lines:
-    root = getattr(array.store, "root", None)
-    if root is None or not Path(root).is_dir():
-        return MemoryLines(
-            shape=array.shape, array=array
-        )  # in memory, or on the network: this process reads and writes it
-    # Two tasks must not write the same file, that of a chunk or of a shard.
-    step = int((getattr(array, "shards", None) or array.chunks)[0])
-    root, path = Path(root).resolve(), str(array.path)
-    return ZarrLines(shape=tuple(array.shape), step=step, place=root / path, root=root, path=path)
 
 
 def _hdf5(array: Any, is_result: bool) -> Lines:

@@ -274,11 +274,8 @@ class BrokenPoolError(RuntimeError):
     """An executor has lost its workers."""
 
 
-def _lost() -> tuple[type[BaseException], ...]:
-    """Return the errors that mean lost workers, not an error of the task."""
-    dask = sys.modules.get("distributed")  # whose errors are not those of concurrent.futures
-    own = () if dask is None else (dask.scheduler.KilledWorker, dask.client.ClosedClientError)
-    return (BrokenExecutor, CancelledError, *own)
+#: Errors that mean lost workers, not an error of the task.
+_LOST = (BrokenExecutor, CancelledError)
 
 
 class _InThisThread(Executor):
@@ -338,7 +335,7 @@ class Pool(Generic[_T]):
         def submit(task: _T) -> None:
             try:
                 future = self.executor.submit(function, task)
-            except _lost() as error:
+            except _LOST as error:
                 self._replace(error)
                 future = self.executor.submit(function, task)
             at_work[future] = task
@@ -359,7 +356,7 @@ class Pool(Generic[_T]):
                 task = at_work.pop(future)
                 try:
                     result = future.result()
-                except _lost() as error:
+                except _LOST as error:
                     # The others are lost with it, or are given up: they are done again on the new one.
                     again += [task, *at_work.values()]
                     for other in at_work:
@@ -437,7 +434,4 @@ def _workers_of(executor: Executor) -> int:
         found = getattr(executor, name, None)
         if isinstance(found, int) and found > 0:
             return found
-    client: Any = getattr(executor, "_client", None)  # of Dask
-    if client is not None and hasattr(client, "ncores"):
-        return max(1, int(sum(client.ncores().values())))
     return available_cores()

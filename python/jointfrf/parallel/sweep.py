@@ -124,7 +124,7 @@ def _duration(seconds: float) -> str:
 
 
 def planned_sweep(
-    operation: str, shapes: dict[str, tuple[int, ...]], n_lines: int, workers: int, step: int, cost: SweepCost
+    operation: str, shapes: dict[str, tuple[int, ...]], n_lines: int, workers: int, cost: SweepCost
 ) -> SweepPlan:
     """Choose the lines of a task.
 
@@ -134,8 +134,6 @@ def planned_sweep(
     shapes : dict of str to tuple
         Of inputs and result.
     n_lines, workers : int
-    step : int
-        Lines that must be written together.
     cost : SweepCost
 
     Notes
@@ -147,8 +145,7 @@ def planned_sweep(
     lines = cost.task / _OVERHEAD / max(cost.line + cost.write, 1e-12)
     # Larger tasks than that lose nothing either, as long as all workers have some and their memory is small.
     lines = min(max(lines, _USUAL_BYTES / line_bytes), CHUNK_BYTES / line_bytes, n_lines / (_TASKS * workers))
-    unit = math.lcm(_SHARE, step)
-    return SweepPlan(operation, shapes, n_lines, max(1, round(lines / unit)) * unit, workers, line_bytes, cost)
+    return SweepPlan(operation, shapes, n_lines, max(1, round(lines / _SHARE)) * _SHARE, workers, line_bytes, cost)
 
 
 @dataclass(frozen=True)
@@ -271,11 +268,11 @@ def sweep(
         Computes each line by itself, such as `invert`, `inverse_substructuring`, or `couple` with what is the same for
         all lines: ``functools.partial(jf.couple, dofs_a=[0], dofs_b=[0])``. Takes the arrays by name.
     arrays : mapping of str to array_like
-        Name of the argument to array, n_lines along its first axis: `numpy.memmap` and Zarr arrays of a folder that all
-        workers see, HDF5 datasets of a file open for reading, each read where it is needed; others are sent.
-    out : ndarray, numpy.memmap, zarr.Array or h5py.Dataset
-        Where results go, n_lines along its first axis. Workers write a memory map and a Zarr array of a folder
-        themselves; into others this process writes what they send back.
+        Name of the argument to array, n_lines along its first axis: workers read `numpy.memmap` and
+        HDF5 datasets of a file open for reading; other arrays are sent to them.
+    out : ndarray, numpy.memmap or h5py.Dataset
+        Array of results, n_lines along its first axis. Workers write a memory map themselves; into other arrays this
+        process writes what they send back.
     executor, jobs
         As in `study`.
     plan : SweepPlan, optional
@@ -324,9 +321,8 @@ def sweep(
     check_progress(progress)
     if plan is not None:
         check_type("plan", plan, SweepPlan)
-    unit = math.lcm(_SHARE, whole.out.step)
-    if not 0 <= as_integer("first", first) < whole.n_lines or first % unit:
-        raise ValueError(f"first must be a multiple of {unit} from 0 to {whole.n_lines - 1}, not {first}")
+    if not 0 <= as_integer("first", first) < whole.n_lines or first % _SHARE:
+        raise ValueError(f"first must be a multiple of {_SHARE} from 0 to {whole.n_lines - 1}, not {first}")
     poor: list[tuple[int, str]] = []
     finished = _Finished(first)
     try:
@@ -419,7 +415,7 @@ def _measured(whole: _Sweep, pool: Pool[Any]) -> SweepPlan:
     line = rate if rate > 0 else seconds[1] / many
     shapes = {name: own.shape for name, own in whole.inputs.items()} | {"out": whole.out.shape}
     cost = SweepCost(line, _write_seconds(whole.out, values) / many, task)
-    return planned_sweep(whole.name, shapes, whole.n_lines, pool.workers, whole.out.step, cost)
+    return planned_sweep(whole.name, shapes, whole.n_lines, pool.workers, cost)
 
 
 def _one(pool: Pool[Any], task: _SweepTask) -> _Done:

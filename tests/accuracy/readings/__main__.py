@@ -7,10 +7,10 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
-from jointfrf.cases.catalogue import UnknownCaseError, find_case, list_cases, read_case
-from jointfrf.cases.known_joint.keys import KnownJointCase
-from jointfrf.cli.usage import positive
-from jointfrf.report.table import as_text, table_csv
+from jointfrf.workbench.cases.catalogue import UnknownCaseError, find_case, list_cases, read_case
+from jointfrf.workbench.cases.known_joint.keys import KnownJointCase
+from jointfrf.workbench.cli.usage import positive
+from jointfrf.workbench.report.table import as_text, table_csv
 
 from . import __doc__ as description
 from .ranking import altogether_table, choices_table, source_tables, totals, values_table

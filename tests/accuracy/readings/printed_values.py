@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jointfrf.cases.keys import BandSet
-from jointfrf.cases.known_joint.keys import ExpectedErrors, ExpectedParameters, KnownJointCase
 from jointfrf.dofs import Parameter
 from jointfrf.substructuring.methods import STIFFNESS_METHODS
+from jointfrf.workbench.cases.keys import BandSet
+from jointfrf.workbench.cases.known_joint.keys import ExpectedErrors, ExpectedParameters, KnownJointCase
 
 #: Rounding of a printed parameter, as a share of its size, and of an error, percent.
 _PARAMETER_DIGITS, _ERROR_DIGITS = 1e-3, 0.005

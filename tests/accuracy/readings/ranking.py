@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from jointfrf.report.table import Cell, Table
+from jointfrf.workbench.report.table import Cell, Table
 
 from .reading import Reading
 from .study import Explained

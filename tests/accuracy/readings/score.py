@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jointfrf.kernel.arguments import FloatArray
-from jointfrf.report.axes import percentiles
+from jointfrf.workbench.report.axes import percentiles
 
 
 class Score(NamedTuple):

@@ -9,8 +9,12 @@ from itertools import product
 
 import numpy as np
 
-from jointfrf.cases.keys import BandSet, Observed
-from jointfrf.cases.known_joint.exact import (
+from jointfrf.dofs import rigid_offset
+from jointfrf.errors import IllConditionedWarning
+from jointfrf.frf.bands import in_bands
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.workbench.cases.keys import BandSet, Observed
+from jointfrf.workbench.cases.known_joint.exact import (
     SHORT_FORM,
     Exact,
     exact_frfs,
@@ -19,13 +23,9 @@ from jointfrf.cases.known_joint.exact import (
     needed_frfs,
     noise_stream,
 )
-from jointfrf.cases.known_joint.keys import ExpectedErrors, KnownJointCase
-from jointfrf.cases.known_joint.realisations import chunk_size, means_over_bands
-from jointfrf.cases.known_joint.regenerate import regenerate
-from jointfrf.dofs import rigid_offset
-from jointfrf.errors import IllConditionedWarning
-from jointfrf.frf.bands import in_bands
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.workbench.cases.known_joint.keys import ExpectedErrors, KnownJointCase
+from jointfrf.workbench.cases.known_joint.realisations import chunk_size, means_over_bands
+from jointfrf.workbench.cases.known_joint.regenerate import regenerate
 
 from .printed_values import ErrorQuantity, PrintedTable, printed_tables
 from .reading import Draw, NoiseScale, Reading, every_reading, noise_numbers, reference_moduli

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from jointfrf.cases import catalogue
-from jointfrf.cases.catalogue import KINDS, find_case, key_page, list_cases, read_case
-from jointfrf.cli.main import main
 from jointfrf.errors import FileContentError
 from jointfrf.spelling import look_alike
 from jointfrf.toml.declared import keys_of
 from jointfrf.toml.documents import schema_of
 from jointfrf.toml.table import TomlTable, read_toml
+from jointfrf.workbench.cases import catalogue
+from jointfrf.workbench.cases.catalogue import KINDS, find_case, key_page, list_cases, read_case
+from jointfrf.workbench.cli.main import main
 from own_case import write_by_matrices, write_by_receptances
 from thinned_cases import DrawSome
 
@@ -194,7 +194,7 @@ LONG = pytest.param("known-joint", marks=pytest.mark.long)
 @pytest.mark.parametrize("kind", [LONG if kind == "known-joint" else kind for kind in (*KINDS, "study")])
 def test_a_template_runs_as_it_stands(kind, tmp_path, capsys, monkeypatch, without_pictures):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("jointfrf.studies.result.draw", DrawSome())
+    monkeypatch.setattr("jointfrf.workbench.studies.result.draw", DrawSome())
     assert main(["new", kind, "own"]) == 0
     text = (tmp_path / "own" / "case.toml").read_text()
     assert text.startswith("#:schema ./case.schema.json\n")

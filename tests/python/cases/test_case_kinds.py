@@ -12,18 +12,18 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.cases.catalogue import KINDS, find_case, list_cases, read_case, read_case_and_kind, run_case
-from jointfrf.cases.keys import Case, CaseKeys, ExpectedKeys
-from jointfrf.cases.kind import CaseKind
-from jointfrf.cases.known_joint.exact import exact_frfs
-from jointfrf.cases.known_joint.realisations import estimate_realisations
-from jointfrf.cases.known_joint.regenerate import regenerate, regenerate_all
-from jointfrf.cases.workers import Workers
 from jointfrf.dofs import Parameter
 from jointfrf.errors import FileContentError
-from jointfrf.report.figure import Curve, Figure, Panel
-from jointfrf.report.table import Table
 from jointfrf.toml.declared import NotNegative, Positive, key
+from jointfrf.workbench.cases.catalogue import KINDS, find_case, list_cases, read_case, read_case_and_kind, run_case
+from jointfrf.workbench.cases.keys import Case, CaseKeys, ExpectedKeys
+from jointfrf.workbench.cases.kind import CaseKind
+from jointfrf.workbench.cases.known_joint.exact import exact_frfs
+from jointfrf.workbench.cases.known_joint.realisations import estimate_realisations
+from jointfrf.workbench.cases.known_joint.regenerate import regenerate, regenerate_all
+from jointfrf.workbench.cases.workers import Workers
+from jointfrf.workbench.report.figure import Curve, Figure, Panel
+from jointfrf.workbench.report.table import Table
 
 
 def test_every_case_names_a_kind_of_the_registry_or_none():
@@ -206,7 +206,7 @@ def test_lines_that_are_kept_own_their_memory(identified):
 def test_realisations_in_chunks_are_those_at_once(identified, monkeypatch):
     _, exact, found = identified
     whole = regenerate(exact, found[0].theta, "r")
-    monkeypatch.setattr("jointfrf.cases.known_joint.regenerate.chunk_size", lambda n_freq, entries: 2)
+    monkeypatch.setattr("jointfrf.workbench.cases.known_joint.regenerate.chunk_size", lambda n_freq, entries: 2)
     np.testing.assert_allclose(regenerate(exact, found[0].theta, "r"), whole, rtol=1e-13)
 
 
@@ -216,9 +216,9 @@ ADDED = '''
 from pathlib import Path
 from typing import Annotated
 
-from jointfrf.cases.keys import CaseKeys
-from jointfrf.cases.kind import CaseKind
-from jointfrf.report.table import Table
+from jointfrf.workbench.cases.keys import CaseKeys
+from jointfrf.workbench.cases.kind import CaseKind
+from jointfrf.workbench.report.table import Table
 from jointfrf.toml.declared import Positive, key
 
 
@@ -243,8 +243,8 @@ KIND = CaseKind(
 def test_a_kind_is_added_by_a_folder_and_a_line(tmp_path):
     """In a copy of the package: the help, the template, the schema, the reference and the reader know it."""
     package = shutil.copytree(Path(jf.__file__).parent, tmp_path / "jointfrf", ignore=shutil.ignore_patterns("*.pyc"))
-    (package / "cases" / "pendulum").mkdir()
-    (package / "cases" / "pendulum" / "__init__.py").write_text(ADDED)
+    (package / "workbench" / "cases" / "pendulum").mkdir()
+    (package / "workbench" / "cases" / "pendulum" / "__init__.py").write_text(ADDED)
     words = package / "choices.py"
     last = '"modelled-joint")\n'
     text = words.read_text()
@@ -255,7 +255,7 @@ def test_a_kind_is_added_by_a_folder_and_a_line(tmp_path):
         "sys.meta_path = [one for one in sys.meta_path if 'editable' not in type(one).__module__]; "
         "spec = importlib.util.spec_from_file_location('jointfrf._kernel', sys.argv.pop(1)); "
         "kernel = importlib.util.module_from_spec(spec); sys.modules['jointfrf._kernel'] = kernel; "
-        "spec.loader.exec_module(kernel); from jointfrf.cli.main import main\n"
+        "spec.loader.exec_module(kernel); from jointfrf.workbench.cli.main import main\n"
         "for words in sys.argv[1:]:\n"
         "    try: status = main(words.split())\n"
         "    except SystemExit as stop: status = stop.code\n"

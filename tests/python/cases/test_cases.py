@@ -11,21 +11,21 @@ import pytest
 from msgspec import structs
 
 import jointfrf as jf
-from jointfrf.cases.catalogue import UnknownCaseError, find_case, list_cases, numbered, read_case, run_case
-from jointfrf.cases.known_joint.exact import exact_frfs, noise_free_errors
-from jointfrf.cases.known_joint.figures import build_figures
-from jointfrf.cases.known_joint.realisations import estimate_realisations
-from jointfrf.cases.known_joint.tables import (
+from jointfrf.dofs import Parameter
+from jointfrf.identification.realisations import viscous_joints
+from jointfrf.substructuring.methods import STIFFNESS_METHODS
+from jointfrf.workbench.cases.catalogue import UnknownCaseError, find_case, list_cases, numbered, read_case, run_case
+from jointfrf.workbench.cases.known_joint.exact import exact_frfs, noise_free_errors
+from jointfrf.workbench.cases.known_joint.figures import build_figures
+from jointfrf.workbench.cases.known_joint.realisations import estimate_realisations
+from jointfrf.workbench.cases.known_joint.tables import (
     build_numbers,
     build_summary,
     build_tables,
     identified_rows,
 )
-from jointfrf.cases.workers import Workers
-from jointfrf.dofs import Parameter
-from jointfrf.identification.realisations import viscous_joints
-from jointfrf.report.document import Page, make_document
-from jointfrf.substructuring.methods import STIFFNESS_METHODS
+from jointfrf.workbench.cases.workers import Workers
+from jointfrf.workbench.report.document import Page, make_document
 from thinned_cases import PLANE, SOLID
 
 NAMES = [*PLANE, *SOLID, "4.3.3-bolt"]
@@ -525,7 +525,7 @@ def test_fits_of_a_realisation_do_not_depend_on_those_computed_with_it(monkeypat
     )
     exact = exact_frfs(case)
     together = estimate_realisations(case, exact, 3)
-    monkeypatch.setattr("jointfrf.cases.known_joint.realisations.chunk_size", lambda n_freq, entries: 1)
+    monkeypatch.setattr("jointfrf.workbench.cases.known_joint.realisations.chunk_size", lambda n_freq, entries: 1)
     for a, b in zip(together, estimate_realisations(case, exact, 3), strict=True):
         np.testing.assert_array_equal(a.theta, b.theta)
 

@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from jointfrf.cases.catalogue import find_case, read_case
 from jointfrf.errors import FileContentError
+from jointfrf.workbench.cases.catalogue import find_case, read_case
 
 CHANGES = [
     (

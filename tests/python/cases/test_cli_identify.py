@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from command import run_command
-from jointfrf.cli.main import main
 from jointfrf.io import read_frfs, write_frfs
+from jointfrf.workbench.cli.main import main
 from thinned_cases import DrawSome
 from uff_writer import function
 
@@ -84,7 +84,7 @@ def of_bars(tmp_path_factory):
     """The joint of the bars by two methods: what was said, and the folder of its files, of a DOF without pictures."""
     folder = tmp_path_factory.mktemp("out") / "deep" / "bars"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("jointfrf.report.fit.draw", DrawSome(frozenset(["noise_found", "joint_y"])))
+        patch.setattr("jointfrf.workbench.report.fit.draw", DrawSome(frozenset(["noise_found", "joint_y"])))
         return run(BARS, *JOINT_OF_BARS, "--method", "compliance,inverse-substructuring", "--out", folder), folder
 
 

@@ -14,11 +14,11 @@ import pytest
 import jointfrf as jf
 from command import run_command
 from documents import DOCUMENTS, agree, blocks
-from jointfrf.assembly_file.read import read_assembly_file
-from jointfrf.cli.export import CardRequest
-from jointfrf.cli.identify_model import _place_of_joint, _rigid_faces
 from jointfrf.io import read_frfs, write_frfs
 from jointfrf.models.points import PointPatch
+from jointfrf.workbench.assembly_file.read import read_assembly_file
+from jointfrf.workbench.cli.export import CardRequest
+from jointfrf.workbench.cli.identify_model import _place_of_joint, _rigid_faces
 from thinned_cases import DrawSome
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
@@ -58,7 +58,7 @@ def table(request, tmp_path_factory):
     """The fits of the first and the last level, and of all: what was said, the folder with empty pictures, levels."""
     folder = tmp_path_factory.mktemp("lap") / "out"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("jointfrf.report.fit.draw", DrawSome())
+        patch.setattr("jointfrf.workbench.report.fit.draw", DrawSome())
         return run(*request.param, "--each", *MODEL, "--out", folder), folder, request.param
 
 
@@ -204,7 +204,7 @@ def test_wrong_words(tmp_path, monkeypatch, words, status, sentence):
 
 
 def test_laws_by_words_and_by_a_file_are_one_fit(tmp_path, monkeypatch):
-    monkeypatch.setattr("jointfrf.report.fit.draw", DrawSome())
+    monkeypatch.setattr("jointfrf.workbench.report.fit.draw", DrawSome())
     words = run(*BARS, "--law", "y=spring", "--law", "theta_z=spring", "--json")
     (tmp_path / "joint.toml").write_text('dofs = ["y", "theta_z"]\nstiffness = [2e6, 2e3]\ndamping = [50.0, 0.5]\n')
     page = tmp_path / "report.html"

@@ -22,10 +22,10 @@ import pytest
 
 from command import run_command
 from jointfrf.__main__ import main as started
-from jointfrf.cli import usage
-from jointfrf.cli.main import main
-from jointfrf.cli.parser import COMMANDS, command_parser
 from jointfrf.errors import FrfCheckWarning
+from jointfrf.workbench.cli import usage
+from jointfrf.workbench.cli.main import main
+from jointfrf.workbench.cli.parser import COMMANDS, command_parser
 from thinned_cases import DrawSome
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -262,7 +262,7 @@ def test_a_test_that_fails_ends_no_other_one():
 @pytest.mark.usefixtures("_models")
 @pytest.mark.parametrize("wrong", [AssertionError("no"), IndexError("no"), np.linalg.LinAlgError("no")])
 def test_any_error_of_a_test_is_named_at_the_end(monkeypatch, wrong):
-    from jointfrf.cli import identify_model
+    from jointfrf.workbench.cli import identify_model
 
     fit = identify_model._one
     one = lambda args, out: fit(args, out) if args.files[0].name != "d.npz" else (_ for _ in ()).throw(wrong)  # noqa: E731
@@ -276,7 +276,7 @@ def test_any_error_of_a_test_is_named_at_the_end(monkeypatch, wrong):
 
 @pytest.mark.usefixtures("_models")
 def test_an_interrupt_leaves_the_tests_that_are_finished(monkeypatch):
-    from jointfrf.cli import identify_model
+    from jointfrf.workbench.cli import identify_model
 
     fit = identify_model._one
 
@@ -295,7 +295,7 @@ def test_an_interrupt_leaves_the_tests_that_are_finished(monkeypatch):
 
 
 def test_an_interrupt_leaves_the_methods_that_are_finished(monkeypatch):
-    from jointfrf.cli import identify as command
+    from jointfrf.workbench.cli import identify as command
 
     fit = command._fit
 
@@ -315,7 +315,7 @@ def test_an_interrupt_leaves_the_methods_that_are_finished(monkeypatch):
 
 @pytest.mark.usefixtures("_models")
 def test_levels_and_pool_name_files_that_fail(monkeypatch):
-    from jointfrf.cli import levels as command
+    from jointfrf.workbench.cli import levels as command
 
     words = ["levels", *EACH[1:5], "--level", "1,2,3,4", "--model", "assembly.toml", "--noise", "0.001"]
     result = run_command(*words)
@@ -528,7 +528,7 @@ def test_an_interrupt_that_an_import_calls_something_else(monkeypatch, capsys):
         except KeyboardInterrupt as error:
             raise ImportError("numpy was cut short") from error
 
-    monkeypatch.setattr("jointfrf.cli.cases.run", cut_short)
+    monkeypatch.setattr("jointfrf.workbench.cli.cases.run", cut_short)
     monkeypatch.setattr(signal, "getsignal", lambda number: signal.default_int_handler)
     assert main(["cases"]) == 130
     assert capsys.readouterr().err == "jointfrf: error: interrupted\n"
@@ -544,7 +544,7 @@ def test_an_interrupt_inside_a_callback_that_an_import_calls(monkeypatch, capsys
         assert held() is None
         return command_parser(name)
 
-    monkeypatch.setattr("jointfrf.cli.main.command_parser", swallowed)
+    monkeypatch.setattr("jointfrf.workbench.cli.main.command_parser", swallowed)
     monkeypatch.setattr(signal, "getsignal", lambda number: signal.default_int_handler)
     assert main(["cases"]) == 130
     assert capsys.readouterr().err == "jointfrf: error: interrupted\n"
@@ -553,10 +553,10 @@ def test_an_interrupt_inside_a_callback_that_an_import_calls(monkeypatch, capsys
 def test_an_interrupt_while_the_command_is_imported(monkeypatch, capsys):
     class Cut:
         def find_spec(self, name, path=None, target=None):
-            if name == "jointfrf.cli.main":
+            if name == "jointfrf.workbench.cli.main":
                 raise KeyboardInterrupt
 
-    monkeypatch.delitem(sys.modules, "jointfrf.cli.main")
+    monkeypatch.delitem(sys.modules, "jointfrf.workbench.cli.main")
     monkeypatch.setattr(sys, "meta_path", [Cut(), *sys.meta_path])
     assert started() == 130
     assert capsys.readouterr().err == "jointfrf: error: interrupted\n"
@@ -671,8 +671,7 @@ def test_a_file_that_is_found_writes_nothing(tmp_path, monkeypatch, said, key):
 
 
 def test_a_file_that_is_found_names_no_executor(tmp_path):
-    """Dask takes pickles from whoever it connects to."""
-    Path("jointfrf.toml").write_text('[study]\nexecutor = "dask:tcp://127.0.0.1:9"\n')
+    Path("jointfrf.toml").write_text('[study]\nexecutor = "mpi"\n')
     result = run_command("study", "4.2", "--realisations", "2")
     assert result.returncode == 1
     assert "[study]: executor: not taken from a jointfrf.toml" in result.stderr
@@ -746,7 +745,7 @@ def test_warnings_are_sentences(monkeypatch):
         usage.Output(args).give({})
         return 0
 
-    monkeypatch.setattr("jointfrf.cli.cases.run", warn)
+    monkeypatch.setattr("jointfrf.workbench.cli.cases.run", warn)
     result = run_command("cases", "--json")
     shown = ["sign: 101:+y is reversed; turn it", "gain: 102:+y"]
     assert json.loads(result.stdout)["warnings"] == shown
@@ -822,7 +821,7 @@ def test_every_command_that_takes_long_prints_its_stage(monkeypatch, capsys, qui
     printed = threading.Event()
     text = usage._progress_text
     monkeypatch.setattr(usage, "_progress_text", lambda *args, **options: printed.set() or text(*args, **options))
-    monkeypatch.setattr("jointfrf.cli.cases.run", lambda args: 0 if quiet or printed.wait(60) else 1)
+    monkeypatch.setattr("jointfrf.workbench.cli.cases.run", lambda args: 0 if quiet or printed.wait(60) else 1)
     assert main(["cases", *(["--quiet"] if quiet else [])]) == 0
     assert capsys.readouterr() == ("", "" if quiet else "jointfrf: cases: 0 s\n")
 

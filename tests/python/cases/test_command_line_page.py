@@ -7,10 +7,10 @@ import pytest
 
 from command import run_command
 from documents import DOCUMENTS, ROOT
-from jointfrf.cli.configuration import with_configuration
-from jointfrf.cli.parser import COMMANDS, command_parser
 from jointfrf.io.channel_table import places_of_table, read_channel_table
 from jointfrf.toml.table import read_toml
+from jointfrf.workbench.cli.configuration import with_configuration
+from jointfrf.workbench.cli.parser import COMMANDS, command_parser
 from option_tables import commands_with_a_table, filled
 
 PAGE = DOCUMENTS["docs/command-line.md"]

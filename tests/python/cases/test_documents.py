@@ -19,11 +19,11 @@ import jointfrf as jf
 from assembly_keys import assembly_page
 from documents import DOCUMENTS, ROOT, agree, blocks, follow, steps
 from harmonic_balance import Sliders, iwan_beam
-from jointfrf.assembly_file.keys import AssemblyKeys
-from jointfrf.assembly_file.read import read_assembly_file
-from jointfrf.cli.main import main
 from jointfrf.toml.declared import read_keys
 from jointfrf.toml.table import TomlTable
+from jointfrf.workbench.assembly_file.keys import AssemblyKeys
+from jointfrf.workbench.assembly_file.read import read_assembly_file
+from jointfrf.workbench.cli.main import main
 
 
 @pytest.mark.parametrize(

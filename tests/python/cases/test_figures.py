@@ -6,15 +6,15 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from jointfrf.cases.catalogue import list_cases, numbered, read_case
-from jointfrf.cases.known_joint.figures import build_figures
-from jointfrf.cases.known_joint.keys import KnownJointCase
-from jointfrf.cases.known_joint.tables import build_summary, build_tables
-from jointfrf.report.document import Page, make_document
-from jointfrf.report.draw import STYLES, draw, shortened
-from jointfrf.report.figure import Curve, Figure, Interval, Panel
-from jointfrf.report.receptance import PHASE, phase_degrees
-from jointfrf.report.table import Table, as_text, shown, table_csv, turned
+from jointfrf.workbench.cases.catalogue import list_cases, numbered, read_case
+from jointfrf.workbench.cases.known_joint.figures import build_figures
+from jointfrf.workbench.cases.known_joint.keys import KnownJointCase
+from jointfrf.workbench.cases.known_joint.tables import build_summary, build_tables
+from jointfrf.workbench.report.document import Page, make_document
+from jointfrf.workbench.report.draw import STYLES, draw, shortened
+from jointfrf.workbench.report.figure import Curve, Figure, Interval, Panel
+from jointfrf.workbench.report.receptance import PHASE, phase_degrees
+from jointfrf.workbench.report.table import Table, as_text, shown, table_csv, turned
 
 X = np.linspace(0, 10, 50)
 

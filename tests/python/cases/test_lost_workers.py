@@ -1,4 +1,4 @@
-"""Workers killed at work, of loky and of a local Dask cluster: studies and sweeps end with the same numbers."""
+"""Workers of loky killed at work: studies and sweeps end with the same numbers."""
 
 import re
 import signal
@@ -45,16 +45,6 @@ def reference(marks, tmp_path_factory):
     for call in "123":
         (marks / call).touch()
     return jf.study("3.1", tmp_path_factory.mktemp("study"), N, design=DESIGN, jobs=1)
-
-
-@pytest.fixture(scope="module")
-def client(marks):
-    distributed = pytest.importorskip("distributed")
-    with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        yield client
 
 
 @contextmanager
@@ -123,33 +113,3 @@ def test_a_sweep_on_loky_of_the_caller_says_where_to_go_on(lines, marks, deaths)
     result[first:] = 0
     sweep_of(lines, result, marks, jobs=1, first=first)
     assert (result == jf.invert(lines)).all()
-
-
-def test_a_study_on_a_dask_cluster_goes_on_with_the_other_worker(client, reference, deaths, tmp_path):
-    found = jf.study("3.1", tmp_path, N, design=DESIGN, executor=client.get_executor())
-    assert deaths()
-    assert found.missing == 0
-    assert same(found, reference)
-
-
-def test_a_sweep_on_a_dask_cluster_goes_on_with_the_other_worker(client, lines, marks, deaths, tmp_path):
-    result = np.memmap(tmp_path / "out", complex, "w+", shape=lines.shape)
-    sweep_of(lines, result, marks, executor=client.get_executor())
-    assert deaths()
-    assert (result == jf.invert(lines)).all()
-
-
-def test_a_cluster_that_is_gone_is_said_and_nothing_is_lost(client, reference, marks, deaths, tmp_path):
-    for call in "123":
-        (marks / call).touch()
-    distributed = pytest.importorskip("distributed")
-    leaving = distributed.Client(client.cluster)
-    how = {"executor": leaving.get_executor(), "progress": lambda done, total: leaving.close()}
-    with pytest.raises(jf.BrokenPoolError, match="make the same call again") as raised:
-        jf.study("3.1", tmp_path, N, design=DESIGN, **how)
-    assert "\n" not in str(raised.value)
-    kept = chunks(tmp_path)
-    found = jf.study("3.1", tmp_path, N, design=DESIGN, jobs=1)
-    assert kept
-    assert kept <= chunks(tmp_path)
-    assert same(found, reference)

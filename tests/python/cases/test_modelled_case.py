@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from jointfrf.cases.catalogue import find_case, read_case, run_case
 from jointfrf.errors import FileContentError
+from jointfrf.workbench.cases.catalogue import find_case, read_case, run_case
 
 
 def small_case(tmp_path, *changes):

@@ -14,11 +14,11 @@ import scipy.io
 from scipy import sparse
 
 import jointfrf as jf
-from jointfrf.cases.catalogue import read_case
-from jointfrf.cases.known_joint.compute import compute
-from jointfrf.cases.known_joint.exact import exact_frfs
-from jointfrf.cases.known_joint.figures import build_figures
-from jointfrf.cases.known_joint.tables import build_numbers, build_tables, identified_rows
+from jointfrf.workbench.cases.catalogue import read_case
+from jointfrf.workbench.cases.known_joint.compute import compute
+from jointfrf.workbench.cases.known_joint.exact import exact_frfs
+from jointfrf.workbench.cases.known_joint.figures import build_figures
+from jointfrf.workbench.cases.known_joint.tables import build_numbers, build_tables, identified_rows
 from own_case import BEAMS, RECEPTANCES, replace_tables, write_by_matrices, write_by_receptances, write_case
 
 ROOT = Path(__file__).resolve().parents[3]

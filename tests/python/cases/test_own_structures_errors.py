@@ -7,10 +7,10 @@ import pytest
 import scipy.io
 from scipy import sparse
 
-from jointfrf.cases.catalogue import read_case
-from jointfrf.cli.main import main
 from jointfrf.errors import FileContentError
 from jointfrf.io import Channel, FrfSet, read_uff, write_uff
+from jointfrf.workbench.cases.catalogue import read_case
+from jointfrf.workbench.cli.main import main
 from own_case import BEAMS, replace_tables, write_by_matrices, write_by_receptances
 
 K = sparse.csr_array(BEAMS.a.model.stiffness).toarray()

@@ -12,10 +12,10 @@ import pytest
 
 import jointfrf as jf
 from browser import started_browser
-from jointfrf.report.document import Document, HeatMap, Page, Section, make_document
-from jointfrf.report.draw import draw
-from jointfrf.report.figure import Curve, Figure, Panel
-from jointfrf.report.table import Table
+from jointfrf.workbench.report.document import Document, HeatMap, Page, Section, make_document
+from jointfrf.workbench.report.draw import draw
+from jointfrf.workbench.report.figure import Curve, Figure, Panel
+from jointfrf.workbench.report.table import Table
 
 BARS = Path(__file__).resolve().parents[3] / "cases" / "hammer-test" / "two_bars.uff"
 

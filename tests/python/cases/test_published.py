@@ -8,9 +8,9 @@ from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
 import jointfrf as jf
-from jointfrf.cases.catalogue import find_case
-from jointfrf.cases.known_joint.tables import build_tables
 from jointfrf.dofs import Parameter
+from jointfrf.workbench.cases.catalogue import find_case
+from jointfrf.workbench.cases.known_joint.tables import build_tables
 from thinned_cases import PLANE, SOLID
 
 NAMES = [*PLANE, *SOLID]

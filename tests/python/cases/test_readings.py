@@ -13,11 +13,11 @@ from readings.score import score
 from readings.study import ReadingsPlan, group_cases, study_readings
 
 import jointfrf as jf
-from jointfrf.cases.catalogue import find_case, read_case
-from jointfrf.cases.known_joint.exact import exact_frfs
-from jointfrf.cases.known_joint.realisations import estimate_realisations
-from jointfrf.cases.known_joint.regenerate import regenerate_all
-from jointfrf.cases.workers import Workers
+from jointfrf.workbench.cases.catalogue import find_case, read_case
+from jointfrf.workbench.cases.known_joint.exact import exact_frfs
+from jointfrf.workbench.cases.known_joint.realisations import estimate_realisations
+from jointfrf.workbench.cases.known_joint.regenerate import regenerate_all
+from jointfrf.workbench.cases.workers import Workers
 
 #: Readings that `jointfrf.pollute` knows: kind, relative_to.
 POLLUTE = {

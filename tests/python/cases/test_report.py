@@ -9,22 +9,22 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-import jointfrf.report
-from jointfrf.cases.comparison import verdict_sentence
+import jointfrf.workbench.report
 from jointfrf.dofs import Parameter
-from jointfrf.report.axes import bulk_limits, modulus_label, parameter_label, parameter_lines
-from jointfrf.report.document import Page, make_document
-from jointfrf.report.draw import draw
-from jointfrf.report.figure import Curve, Figure, Panel
-from jointfrf.report.fit import fit_figures
-from jointfrf.report.table import Table, as_text, plain_rows, table_csv, written
+from jointfrf.workbench.cases.comparison import verdict_sentence
+from jointfrf.workbench.report.axes import bulk_limits, modulus_label, parameter_label, parameter_lines
+from jointfrf.workbench.report.document import Page, make_document
+from jointfrf.workbench.report.draw import draw
+from jointfrf.workbench.report.figure import Curve, Figure, Panel
+from jointfrf.workbench.report.fit import fit_figures
+from jointfrf.workbench.report.table import Table, as_text, plain_rows, table_csv, written
 
 
 def test_the_report_room_knows_of_no_case():
-    for path in Path(jointfrf.report.__file__).parent.glob("*.py"):
+    for path in Path(jointfrf.workbench.report.__file__).parent.glob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.ImportFrom):
-                assert not str(node.module).startswith(("jointfrf.cases", "jointfrf.cli")), path
+                assert not str(node.module).startswith(("jointfrf.workbench.cases", "jointfrf.workbench.cli")), path
 
 
 def test_limits_leave_out_a_few_outliers_and_hold_what_must_be_seen():

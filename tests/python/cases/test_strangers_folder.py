@@ -16,13 +16,13 @@ import pytest
 
 import jointfrf as jf
 from command import run_command
-from jointfrf.cases.catalogue import find_case, run_case
 from jointfrf.io.card_link import CardFormat
-from jointfrf.report.chart import Chart
-from jointfrf.report.document import Document, Section, Words, make_document
-from jointfrf.report.draw import draw
-from jointfrf.report.figure import Curve, Figure, Panel, figure_csv
-from jointfrf.report.table import Table, table_csv
+from jointfrf.workbench.cases.catalogue import find_case, run_case
+from jointfrf.workbench.report.chart import Chart
+from jointfrf.workbench.report.document import Document, Section, Words, make_document
+from jointfrf.workbench.report.draw import draw
+from jointfrf.workbench.report.figure import Curve, Figure, Panel, figure_csv
+from jointfrf.workbench.report.table import Table, table_csv
 from thinned_cases import DrawSome
 
 pytest.importorskip("matplotlib")
@@ -55,7 +55,8 @@ def test_names_in_a_case_are_no_paths_no_orders_and_no_formulas(tmp_path, monkey
     deep = tmp_path / "a" / "b" / "c" / "d"
     deep.mkdir(parents=True)
     monkeypatch.chdir(deep)
-    monkeypatch.setattr("jointfrf.cases.catalogue.draw", DrawSome(frozenset([f"identified-k_{DOF}", "noise"])))
+    drawn = DrawSome(frozenset([f"identified-k_{DOF}", "noise"]))
+    monkeypatch.setattr("jointfrf.workbench.cases.catalogue.draw", drawn)
     case = case_of_a_stranger(tmp_path / "case")
     shown = run_command("run", case, "--out", "results", "--realisations", "2", "--jobs", "1")
     assert shown.returncode == 0, shown.stderr
@@ -186,10 +187,10 @@ def test_comments_of_cards_stay_comments(program):
 
 _DRAW = """
 import numpy as np
-from jointfrf.report.chart import Chart
-from jointfrf.report.document import Document, Section, Words, make_document
-from jointfrf.report.draw import draw
-from jointfrf.report.figure import Curve, Figure, Panel
+from jointfrf.workbench.report.chart import Chart
+from jointfrf.workbench.report.document import Document, Section, Words, make_document
+from jointfrf.workbench.report.draw import draw
+from jointfrf.workbench.report.figure import Curve, Figure, Panel
 x = np.array([1.0, 2.0])
 drawn = draw(Figure("key", "", (Panel("title", "x", "y", (Curve("curve", x, x, "actual"),)),)))
 print(len(drawn.png))

@@ -20,10 +20,10 @@ from msgspec import structs
 
 import jointfrf as jf
 from command import run_command
-from jointfrf.cases.catalogue import find_case, read_case
-from jointfrf.cases.known_joint.exact import exact_frfs
-from jointfrf.cases.known_joint.realisations import estimate_realisations
-from jointfrf.studies.summary import ParameterSummary, study_figures
+from jointfrf.workbench.cases.catalogue import find_case, read_case
+from jointfrf.workbench.cases.known_joint.exact import exact_frfs
+from jointfrf.workbench.cases.known_joint.realisations import estimate_realisations
+from jointfrf.workbench.studies.summary import ParameterSummary, study_figures
 from studied_case import CASE, DESIGN, WORDS, N, broken_off, doubled, same
 
 
@@ -71,17 +71,6 @@ def test_loky_gives_the_same_numbers(reference, tmp_path):
     loky = pytest.importorskip("loky")
     made = lambda: loky.get_reusable_executor(max_workers=2)  # noqa: E731
     assert same(studied(tmp_path, executor=made), reference)
-
-
-@pytest.mark.long
-@pytest.mark.filterwarnings("ignore::ResourceWarning")
-def test_a_dask_cluster_of_two_workers_gives_the_same_numbers(reference, tmp_path):
-    distributed = pytest.importorskip("distributed")
-    with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        assert same(studied(tmp_path, executor=client.get_executor()), reference)
 
 
 def mpiexec() -> str | None:
@@ -313,7 +302,7 @@ def test_command_says_what_the_study_holds(reference, tmp_path):
         (
             ["3.1", "--executor", "dusk"],
             2,
-            "unknown executor 'dusk'; use one of processes, threads, loky, mpi, dask:ADDRESS",
+            "unknown executor 'dusk'; use one of processes, threads, loky, mpi",
         ),
         (["3.1", "--values", "csv"], 2, "unknown format 'csv'; use parquet or npz"),
     ],
@@ -329,4 +318,4 @@ def test_wrong_words_are_one_sentence(words, status, message, tmp_path, monkeypa
 
 def test_extras_of_the_page_are_there():
     extras = tomllib.loads((Path(__file__).resolve().parents[3] / "pyproject.toml").read_text(encoding="utf-8"))
-    assert {"loky", "dask", "mpi", "parquet", "zarr"} <= set(extras["project"]["optional-dependencies"])
+    assert {"loky", "mpi", "parquet"} <= set(extras["project"]["optional-dependencies"])

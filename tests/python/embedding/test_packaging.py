@@ -14,7 +14,7 @@ import tarfile
 import tomllib
 
 import pytest
-import yaml  # which dask brings
+import yaml
 
 import jointfrf
 from jointfrf import _kernel
@@ -113,7 +113,7 @@ assert all(pathlib.Path(m).is_relative_to(sys.prefix) for m in fortran), fortran
 #: What a fit and a command need beyond that.
 FIT = """
 import shutil
-from jointfrf.cli.main import main
+from jointfrf.workbench.cli.main import main
 assert not any(map(shutil.which, ("cc", "gcc", "gfortran", "sh"))), "the root is not clean"
 freq = np.linspace(0.5, 10, 200)
 a = jointfrf.chain([5], [2500], [3], ground="start").receptance(freq)

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 import jointfrf as jf
-from jointfrf.amplitude.friction import bouc_wen, iwan, jenkins
+from jointfrf.workbench.amplitude.friction import bouc_wen, iwan, jenkins
 
 AMPLITUDES = np.array([0.03, 0.4, 1.3, 6.0])
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.sparse.csgraph import connected_components
 
 import jointfrf as jf
-from jointfrf.solids.brick_beam import PRESETS
+from jointfrf.workbench.solids.brick_beam import PRESETS
 
 ALUMINIUM = jf.Material(70e9, 0.33, 2700.0)
 SIZE = (0.3, 0.025, 0.006)

@@ -11,12 +11,12 @@ from scipy.sparse.linalg import splu
 
 import jointfrf as jf
 from calculix_deck import deck, displacements, frequency_step, natural_frequencies, run, static_step, stored_matrices
-from jointfrf.solids.bolted_lap import BODIES, LapDivisions, bolted_lap
-from jointfrf.solids.brick import Material
-from jointfrf.solids.brick_beam import brick_beam
-from jointfrf.solids.contact import ContactLaw
-from jointfrf.solids.mesh import extrude, rectangle
-from jointfrf.solids.preload import preload
+from jointfrf.workbench.solids.bolted_lap import BODIES, LapDivisions, bolted_lap
+from jointfrf.workbench.solids.brick import Material
+from jointfrf.workbench.solids.brick_beam import brick_beam
+from jointfrf.workbench.solids.contact import ContactLaw
+from jointfrf.workbench.solids.mesh import extrude, rectangle
+from jointfrf.workbench.solids.preload import preload
 
 CCX = shutil.which("ccx")
 pytestmark = pytest.mark.skipif(CCX is None, reason="CalculiX (ccx) is not on PATH")

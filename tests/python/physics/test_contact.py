@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from jointfrf.solids.brick import Material, assemble_bricks
-from jointfrf.solids.contact import ContactInterface, ContactLaw, solve_contact
-from jointfrf.solids.mesh import Mesh, extrude, rectangle
+from jointfrf.workbench.solids.brick import Material, assemble_bricks
+from jointfrf.workbench.solids.contact import ContactInterface, ContactLaw, solve_contact
+from jointfrf.workbench.solids.mesh import Mesh, extrude, rectangle
 
 RIGID = ContactLaw(0.3, None, None)
 SIDE = 0.02

@@ -11,8 +11,8 @@ from scipy.signal import lfilter
 
 import jointfrf as jf
 from harmonic_balance import Sliders, believed, iwan_beam
-from jointfrf.amplitude.decay import pooled, scatter_over_levels
-from jointfrf.cli.main import main
+from jointfrf.workbench.amplitude.decay import pooled, scatter_over_levels
+from jointfrf.workbench.cli.main import main
 from ring_down import mode_of, ring_down
 
 RATE = 2000.0

@@ -15,11 +15,11 @@ from scipy.optimize import brentq
 import jointfrf as jf
 from harmonic_balance import SECTION, Sliders, believed, iwan_beam
 from jenkins_balance import Jenkins, JenkinsBeam
-from jointfrf.amplitude.friction import iwan
-from jointfrf.amplitude.levels import JointLevel, of_levels
-from jointfrf.cli.main import main
 from jointfrf.identification.derived import Derived
 from jointfrf.io import write_frfs
+from jointfrf.workbench.amplitude.friction import iwan
+from jointfrf.workbench.amplitude.levels import JointLevel, of_levels
+from jointfrf.workbench.cli.main import main
 
 IWAN = (20.0, 1.2e5, -0.4, 0.8)
 FREQ_HZ = np.arange(180.0, 400.5, 2.0)
@@ -528,7 +528,7 @@ def test_what_was_held_may_be_a_position_and_is_checked_before_the_fit(capsys, m
         calls.append(self)
         raise ValueError("no fit in this test")
 
-    monkeypatch.setattr("jointfrf.assembly_file.measured.MeasuredAssembly.fit", fit)
+    monkeypatch.setattr("jointfrf.workbench.assembly_file.measured.MeasuredAssembly.fit", fit)
     words = ["levels", str(CASE / "level_1.uff"), "--model", str(CASE / "assembly.toml"), "--level", "1e-6", "--held"]
     for held in ("B/10:y", "B/@0.135,0,0:y", "joint:theta_x"):
         assert main([*words, held]) != 0

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from scipy import linalg, stats
 from statsmodels.regression.mixed_linear_model import MixedLM
 
-from jointfrf.pooling.random_effects import Mixture, RandomEffects
+from jointfrf.workbench.pooling.random_effects import Mixture, RandomEffects
 
 ONE = np.ones(1)
 

@@ -7,8 +7,8 @@ import pytest
 
 import jointfrf as jf
 from harmonic_balance import SECTION, Sliders, iwan_beam
-from jointfrf.cli.main import main
 from jointfrf.io import Channel, FrfSet, write_frfs
+from jointfrf.workbench.cli.main import main
 
 IWAN = (20.0, 1.2e5, -0.4, 0.8)
 #: Force in N, and the frequency of the peak.

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 import jointfrf as jf
 from jointfrf.dofs import DIRECTIONS, rigid_motion
-from jointfrf.solids.solid import mean_motion
+from jointfrf.workbench.solids.solid import mean_motion
 from rigid_bodies import Body, six
 
 ALUMINIUM = jf.Material(70e9, 0.33, 2700.0)

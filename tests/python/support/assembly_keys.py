@@ -8,10 +8,10 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from jointfrf.assembly_file.keys import AlikeKeys, AssemblyKeys, PartsKeys, PlacedJointKeys
 from jointfrf.io.channel_table import ChannelTableKeys
 from jointfrf.laws.joint_toml import ConstantsKeys, LawJointKeys
 from jointfrf.toml.documents import key_reference
+from jointfrf.workbench.assembly_file.keys import AlikeKeys, AssemblyKeys, PartsKeys, PlacedJointKeys
 
 HEAD = """# Keys of assembly.toml, joint.toml and tables of channels
 

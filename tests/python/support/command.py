@@ -9,8 +9,8 @@ import warnings
 from typing import NamedTuple
 from unittest import mock
 
-from jointfrf.cli import usage
-from jointfrf.cli.main import main
+from jointfrf.workbench.cli import usage
+from jointfrf.workbench.cli.main import main
 
 
 class Finished(NamedTuple):

@@ -8,9 +8,9 @@ import numpy as np
 
 import jointfrf as jf
 from jointfrf.dofs import DIRECTIONS
-from jointfrf.solids.brick import Material
-from jointfrf.solids.mesh import extrude, rectangle
-from jointfrf.solids.solid import Patch, solid_model
+from jointfrf.workbench.solids.brick import Material
+from jointfrf.workbench.solids.mesh import extrude, rectangle
+from jointfrf.workbench.solids.solid import Patch, solid_model
 
 ALUMINIUM = Material(youngs_modulus=70e9, poisson=0.33, density=2700.0, loss_factor=0.005)
 STIFFNESS = np.array([2.4e7, 1.8e7, 4.5e7, 9e3, 1.2e4, 7.5e3])

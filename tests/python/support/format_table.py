@@ -10,8 +10,8 @@ import sys
 from pathlib import Path
 
 from jointfrf.extras import extra_of
-from jointfrf.io.fe.matrix_formats import MATRIX_FORMATS
 from jointfrf.io.formats import FORMATS
+from jointfrf.workbench.fe.matrix_formats import MATRIX_FORMATS
 
 _PLACE = re.compile(r"(<!-- (formats|matrices) -->\n).*?(<!-- end -->\n)", re.DOTALL)
 

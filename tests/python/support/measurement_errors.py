@@ -10,9 +10,9 @@ import numpy as np
 
 import jointfrf as jf
 import six_dof_beams
-from jointfrf.cases.catalogue import find_case, read_case
-from jointfrf.cases.known_joint.exact import exact_frfs
 from jointfrf.dofs import is_rotation
+from jointfrf.workbench.cases.catalogue import find_case, read_case
+from jointfrf.workbench.cases.known_joint.exact import exact_frfs
 
 
 class Structure(NamedTuple):

@@ -10,7 +10,7 @@ import re
 import sys
 from pathlib import Path
 
-from jointfrf.cli.parser import COMMANDS, command_parser, with_value
+from jointfrf.workbench.cli.parser import COMMANDS, command_parser, with_value
 
 _PLACE = re.compile(r"(<!-- options of (\w+) -->\n).*?(<!-- end -->\n)", re.DOTALL)
 #: In the table of what all commands share.

@@ -10,8 +10,8 @@ import numpy as np
 import scipy.io
 from scipy import sparse
 
-from jointfrf.cases.catalogue import find_case, read_case
 from jointfrf.io import Channel, FrfSet, write_uff
+from jointfrf.workbench.cases.catalogue import find_case, read_case
 
 BEAMS = read_case(find_case("3.2"))
 MATRICES = """

@@ -18,7 +18,7 @@ from scipy import linalg, sparse
 from scipy.sparse import csgraph
 
 import jointfrf as jf
-from jointfrf.solids.solid import solid_model
+from jointfrf.workbench.solids.solid import solid_model
 
 EPS = np.finfo(float).eps
 KERNELS = ("Prescott", "Nehalem", "Sandybridge", "Haswell", "SkylakeX", "Zen")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 
-from jointfrf.cases.catalogue import find_case, read_case
-from jointfrf.cases.known_joint.compute import KnownJointResult, compute
-from jointfrf.report.draw import Drawing, draw
-from jointfrf.report.figure import Figure
+from jointfrf.workbench.cases.catalogue import find_case, read_case
+from jointfrf.workbench.cases.known_joint.compute import KnownJointResult, compute
+from jointfrf.workbench.report.draw import Drawing, draw
+from jointfrf.workbench.report.figure import Figure
 
 #: Every so many lines are left and so many realisations drawn. Tails are looked at where there are 120.
 _SHORT = {

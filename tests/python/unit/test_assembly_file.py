@@ -11,14 +11,14 @@ import pytest
 import scipy.io
 
 import jointfrf as jf
-from jointfrf.assembly_file.keys import AssemblyKeys
-from jointfrf.assembly_file.read import read_assembly_file
 from jointfrf.errors import FileContentError
 from jointfrf.io import Channel, FrfSet, write_frfs
-from jointfrf.report.fit_model import is_wide
-from jointfrf.report.fit_page import ReportOptions, finding_sentences, fit_document
-from jointfrf.report.sketch import SketchedPart, _moved_parts, _view_along, assembly_sketch
 from jointfrf.toml.documents import schema_of
+from jointfrf.workbench.assembly_file.keys import AssemblyKeys
+from jointfrf.workbench.assembly_file.read import read_assembly_file
+from jointfrf.workbench.report.fit_model import is_wide
+from jointfrf.workbench.report.fit_page import ReportOptions, finding_sentences, fit_document
+from jointfrf.workbench.report.sketch import SketchedPart, _moved_parts, _view_along, assembly_sketch
 
 FREQ = np.linspace(0.5, 10, 300)
 ASSEMBLY = """

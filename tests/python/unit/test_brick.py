@@ -8,7 +8,7 @@ from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 from scipy.spatial.transform import Rotation
 
-from jointfrf.solids.brick import Material, assemble_bricks, brick_quality, element_matrices
+from jointfrf.workbench.solids.brick import Material, assemble_bricks, brick_quality, element_matrices
 
 FORMULATIONS = ("reduced", "incompatible", "full")
 CUBE = np.array([[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], float)

@@ -20,7 +20,7 @@ from jointfrf.identification.model.uncertainty import ModelLinearised
 from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import as_measured
 from jointfrf.identification.residual_test import check_residual
-from jointfrf.report.fit_page import ReportOptions, fit_document
+from jointfrf.workbench.report.fit_page import ReportOptions, fit_document
 
 FREQ = np.arange(15.0, 801.0)
 SECTION = {"youngs_modulus": 67e9, "density": 2700.0, "width": 0.025, "height": 0.006, "loss_factor": 0.01}

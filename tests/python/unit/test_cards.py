@@ -14,7 +14,7 @@ import jointfrf as jf
 from calculix_deck import frequency_step, natural_frequencies
 from jointfrf.dofs import rigid_offset
 from jointfrf.io.card_link import card_real
-from jointfrf.io.fe.bulk import bulk_number
+from jointfrf.workbench.fe.bulk import bulk_number
 
 CCX = shutil.which("ccx")
 DOFS = ("x", "y", "z", "theta_x", "theta_y", "theta_z")

@@ -575,7 +575,7 @@ def test_a_wrong_word_in_the_environment_is_told_in_one_sentence():
 
 
 def test_a_wrong_word_in_the_environment_on_the_command_line(tmp_path):
-    code = "import sys; from jointfrf.cli.main import main; sys.exit(main({!r}))"
+    code = "import sys; from jointfrf.workbench.cli.main import main; sys.exit(main({!r}))"
     run = ["run", "3.1-discrete", "--jobs", "1", "--realisations", "1", "--out", str(tmp_path)]
     assert python(code.format(["--help"]), "quick").returncode == 0
     assert python(code.format(["cases"]), "quick").returncode == 0

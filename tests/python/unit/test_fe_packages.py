@@ -14,7 +14,7 @@ import pytest
 import jointfrf as jf
 from jointfrf.errors import FileContentError
 from jointfrf.extras import import_extra
-from jointfrf.io.fe.matrix_formats import read_matrix
+from jointfrf.workbench.fe.matrix_formats import read_matrix
 
 pytestmark = pytest.mark.long
 

@@ -11,12 +11,12 @@ from scipy import sparse
 
 import jointfrf as jf
 from fe_files import NODE_FILES, WRITERS, block, dmig, in_units, part_toml
-from jointfrf.assembly_file.read import scaled_model
 from jointfrf.errors import FileContentError
-from jointfrf.io.fe.matrix_formats import MATRIX_FORMATS, read_matrix
-from jointfrf.io.fe.nodes import read_dof_names, read_nodes
 from jointfrf.models.facts import model_facts
 from jointfrf.models.points import PointModel, PointPatch, couple_points
+from jointfrf.workbench.assembly_file.read import scaled_model
+from jointfrf.workbench.fe.matrix_formats import MATRIX_FORMATS, read_matrix
+from jointfrf.workbench.fe.nodes import read_dof_names, read_nodes
 
 FREQ = np.array([500.0, 2500.0, 9000.0])
 JOINT = 'joint = ["1:x", "1:y", "1:z"]\n'

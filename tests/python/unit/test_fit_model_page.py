@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.report.fit import fit_figures
-from jointfrf.report.fit_model import (
+from jointfrf.workbench.report.fit import fit_figures
+from jointfrf.workbench.report.fit_model import (
     assurance,
     assurance_map,
     band_map,
@@ -17,7 +17,7 @@ from jointfrf.report.fit_model import (
     next_sentences,
     unknowns_table,
 )
-from jointfrf.report.fit_page import ReportOptions, fit_document
+from jointfrf.workbench.report.fit_page import ReportOptions, fit_document
 
 FREQ = np.arange(15.0, 801.0, 8.0)
 SECTION = {"density": 2700.0, "width": 0.025, "height": 0.006, "loss_factor": 0.01}

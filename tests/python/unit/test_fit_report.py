@@ -13,15 +13,21 @@ from jointfrf.channels.joint_channels import node_dofs
 from jointfrf.dofs import DIRECTIONS, joint_parameters
 from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.result import Fit
-from jointfrf.report.chart import Chart, chart_view, thinned_dots, thinned_line
-from jointfrf.report.document import Document, HeatMap, Section, make_document, words_of_findings
-from jointfrf.report.draw import STYLES
-from jointfrf.report.figure import Curve, Figure, Panel
-from jointfrf.report.fit import fit_figures
-from jointfrf.report.fit_frfs import compare_frfs
-from jointfrf.report.fit_page import ReportOptions, finding_sentences, fit_document, parameter_table, quality_sentences
-from jointfrf.report.sketch import _names, interface_points, interface_sketch, point_table
-from jointfrf.report.table import written
+from jointfrf.workbench.report.chart import Chart, chart_view, thinned_dots, thinned_line
+from jointfrf.workbench.report.document import Document, HeatMap, Section, make_document, words_of_findings
+from jointfrf.workbench.report.draw import STYLES
+from jointfrf.workbench.report.figure import Curve, Figure, Panel
+from jointfrf.workbench.report.fit import fit_figures
+from jointfrf.workbench.report.fit_frfs import compare_frfs
+from jointfrf.workbench.report.fit_page import (
+    ReportOptions,
+    finding_sentences,
+    fit_document,
+    parameter_table,
+    quality_sentences,
+)
+from jointfrf.workbench.report.sketch import _names, interface_points, interface_sketch, point_table
+from jointfrf.workbench.report.table import written
 
 
 def points_of(path: str) -> np.ndarray:

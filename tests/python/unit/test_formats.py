@@ -34,7 +34,7 @@ USE = """
 from pathlib import Path
 import numpy as np
 import jointfrf as jf
-from jointfrf.cli.main import main
+from jointfrf.workbench.cli.main import main
 from format_table import format_table
 assert jf.io.__file__.startswith(sys.argv[1])
 point = (jf.io.Channel(1, "x"),)

@@ -421,9 +421,9 @@ def test_a_name_with_a_line_end_does_not_split_the_message(tmp_path):
 def test_no_file_of_any_kind_is_waited_for(tmp_path):
     """Tables of channels, matrices, DOF names, joints and TOML files, too."""
     from jointfrf.io import read_channel_table
-    from jointfrf.io.fe.matrix_formats import read_matrix
-    from jointfrf.io.fe.nodes import read_dof_names
     from jointfrf.toml.table import read_toml
+    from jointfrf.workbench.fe.matrix_formats import read_matrix
+    from jointfrf.workbench.fe.nodes import read_dof_names
 
     for suffix, read in ((".csv", read_channel_table), (".toml", read_channel_table), (".toml", read_toml),
                          (".mtx", read_matrix), (".txt", read_dof_names), (".json", jf.load)):  # fmt: skip

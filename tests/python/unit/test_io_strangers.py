@@ -17,8 +17,8 @@ from frf_files import FIELDS, FREQ_HZ, GIVEN, full_set, structure_of_testlab, wr
 from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit
 from jointfrf.io import read_frfs, write_hdf5, write_npz
-from jointfrf.io.fe.matrix_formats import read_matrix
 from jointfrf.io.mat_file import mat_fields
+from jointfrf.workbench.fe.matrix_formats import read_matrix
 from uff_writer import function
 
 

@@ -10,15 +10,16 @@ import pytest
 
 import jointfrf
 from command import run_command
-from jointfrf.cli.parser import COMMANDS
 from jointfrf.extras import check_extras, import_extra
+from jointfrf.workbench.cli.parser import COMMANDS
+from packages import package_of
 
 #: Packages of single tasks; those in ALL come with the extra `all`.
 ALL = ("h5py", "jinja2", "matplotlib", "shtab", "pyarrow")
-EXTRAS = (*ALL, "zarr", "loky", "distributed", "mpi4py")
+EXTRAS = (*ALL, "loky", "mpi4py")
 HEAVY = {"numpy", "scipy", "matplotlib", "jinja2", "h5py", "shtab", "importlib.metadata", "jointfrf._kernel"}
 #: What may be imported before the arguments of a command are parsed.
-LIGHT = {"choices", "cli", "directions", "extras", "laws", "messages", "spelling"}
+LIGHT = {"choices", "directions", "extras", "laws", "messages", "spelling", "workbench", "workbench.cli"}
 #: Help, completion and usage errors.
 COMMANDS_PARSED = (
     *([name, "--help"] for name in COMMANDS),
@@ -47,19 +48,26 @@ def test_the_package_imports_nothing_heavy():
 
 
 def test_help_imports_nothing_heavy():
-    call = "from jointfrf.cli.main import main\ntry: main(['--help'])\nexcept SystemExit: pass"
+    call = "from jointfrf.workbench.cli.main import main\ntry: main(['--help'])\nexcept SystemExit: pass"
     found = modules_after(call)
-    assert "jointfrf.cli.main" in found
+    assert "jointfrf.workbench.cli.main" in found
     assert not found & HEAVY
 
 
 @pytest.mark.parametrize("words", COMMANDS_PARSED, ids=" ".join)
 def test_arguments_are_parsed_before_anything_that_computes_is_imported(words):
-    call = f"from jointfrf.cli.main import main\nwith suppress(SystemExit), redirect_stdout(StringIO()): main({words})"
-    found = modules_after(f"from contextlib import redirect_stdout, suppress\nfrom io import StringIO\n{call}")
-    assert "jointfrf.cli.main" in found
+    imports = "from contextlib import redirect_stdout, suppress\nfrom io import StringIO\n"
+    imports += "from jointfrf.workbench.cli.main import main\n"
+    found = modules_after(f"{imports}with suppress(SystemExit), redirect_stdout(StringIO()): main({words})")
+    assert "jointfrf.workbench.cli.main" in found
     assert not found & (HEAVY - {"shtab", "importlib.metadata"})  # completion; laws of other packages
-    assert not [name for name in found if name.startswith("jointfrf.") and name.split(".")[1] not in LIGHT]
+    assert {package_of(name) for name in found if name.startswith("jointfrf.")} <= LIGHT
+
+
+def test_the_core_imports_no_workbench():
+    found = modules_after("import jointfrf\njointfrf.identify, jointfrf.identify_model, jointfrf.io.FrfSet")
+    assert "jointfrf.identification.model.fit" in found
+    assert not [name for name in found if name.startswith("jointfrf.workbench")]
 
 
 def test_a_name_imports_only_what_it_needs():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.solids.mesh import Plan, disc, extrude, holed_rectangle, join_plans, rectangle
+from jointfrf.workbench.solids.mesh import Plan, disc, extrude, holed_rectangle, join_plans, rectangle
 
 HOLE, HEAD, WIDTH = 4.5e-3, 6.5e-3, 25e-3
 LAYERS = np.array([0.0, 2e-3, 6e-3])

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from jointfrf.cli.usage import complain
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.io import read_frfs
 from jointfrf.spelling import LONGEST_MESSAGE, cut, message
+from jointfrf.workbench.cli.usage import complain
 
 
 @pytest.mark.parametrize("kind", [FileContentError, FileContentWarning])

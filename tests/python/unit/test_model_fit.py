@@ -9,7 +9,6 @@ import pytest
 from scipy import sparse
 
 import jointfrf as jf
-from jointfrf.cases.known_joint.decoupling import decoupling_bound, decoupling_fits, fit_decoupling
 from jointfrf.identification.line_starts import from_lines
 from jointfrf.identification.model import realisations
 from jointfrf.identification.model.fit import fit_assembly
@@ -17,6 +16,7 @@ from jointfrf.identification.model.prediction import Prediction, parameter_vecto
 from jointfrf.identification.model.prepare import Channels, prepare_model_fit
 from jointfrf.identification.model.reduced import MatrixPolynomial
 from jointfrf.identification.noise import NoiseOptions
+from jointfrf.workbench.cases.known_joint.decoupling import decoupling_bound, decoupling_fits, fit_decoupling
 from model_bound import model_bound
 
 FREQ = np.linspace(12, 620, 77)

@@ -26,7 +26,7 @@ assert jf.__file__.startswith(sys.argv[1])
 USES_LAW = """
 import io, contextlib, pathlib
 import numpy as np
-from jointfrf.cli.main import main
+from jointfrf.workbench.cli.main import main
 folder = pathlib.Path(sys.argv[3])
 text = '[[law]]\\ndof = "x"\\nlaw = "inertial-spring"\\nvalues = { k = 2000.0, inertance = 0.1 }\\n'
 (folder / "joint.toml").write_text(text)
@@ -49,7 +49,7 @@ assert "InertialSpring of x at 5 Hz" in joint.export("abaqus", (1, 2), freq_hz=5
 USES_NOISE = """
 import io, contextlib
 import numpy as np
-from jointfrf.cli.main import main
+from jointfrf.workbench.cli.main import main
 h = np.ones((2000, 1, 1), complex)
 assert abs(np.mean(abs(jf.pollute(h, 0.1, "twice") - h) ** 2) / 0.02 - 1) < 0.1
 with contextlib.redirect_stdout(io.StringIO()) as shown:

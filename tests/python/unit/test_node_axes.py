@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 import jointfrf as jf
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.io import read_uff
-from jointfrf.io.fe.nodes import read_nodes
-from jointfrf.io.modes import read_modes
+from jointfrf.workbench.fe.modes import read_modes
+from jointfrf.workbench.fe.nodes import read_nodes
 from uff_writer import dataset, function, nodes_2411, units
 
 OBLIQUE = Rotation.from_euler("zyx", [30.0, -50.0, 20.0], degrees=True).as_matrix()

@@ -3,7 +3,6 @@
 import signal
 import threading
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
-from types import SimpleNamespace
 
 import pytest
 from threadpoolctl import threadpool_info
@@ -98,10 +97,7 @@ def test_workers_are_counted_as_each_package_calls_them():
 
     assert workers_of(_max_workers=3) == 3
     assert workers_of(num_workers=5) == 5
-    dask = SimpleNamespace(ncores=lambda: {"tcp://a": 300, "tcp://b": 400})
-    assert workers_of(_client=dask) == 700
-    assert workers_of(_client=SimpleNamespace(ncores=dict)) == 1  # none has come yet
-    assert workers_of() == workers_of(_client=object()) == available_cores()
+    assert workers_of() == available_cores()
 
 
 class Fragile(ThreadPoolExecutor):
@@ -140,31 +136,6 @@ def test_a_broken_executor_of_the_caller_is_said():
     with opened_pool(Fragile()) as pool, pytest.raises(jf.BrokenPoolError, match="make the same call again"):
         do(pool)
     assert set(done) <= {0, 1}
-
-
-def errors_of_dask():
-    distributed = pytest.importorskip("distributed")
-    return [
-        distributed.scheduler.KilledWorker("task", None, 3),
-        distributed.client.ClosedClientError("First. Second."),
-    ]
-
-
-@pytest.mark.parametrize("number", [0, 1])
-def test_what_dask_says_of_lost_workers_is_said_alike(number):
-    error = errors_of_dask()[number]
-
-    class Lost(Fragile):
-        def submit(self, fn, /, *args, **kwargs):
-            future = super().submit(fn, *args, **kwargs)
-            if self.begun == 2:
-                raise error
-            return future
-
-    with opened_pool(Lost()) as pool, pytest.raises(jf.BrokenPoolError, match="make the same call again"):
-        list(pool.completed(abs, iter(range(3))))
-    with opened_pool(Lost) as pool:
-        assert sorted(pool.completed(abs, iter(range(3)))) == [(0, 0), (1, 1), (2, 2)]
 
 
 def test_what_an_executor_refuses_is_said_as_it_is():

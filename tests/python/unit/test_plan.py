@@ -10,9 +10,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import jointfrf as jf
-from jointfrf.cli.main import main
 from jointfrf.identification.information_bound import least_std_errors
-from jointfrf.planning.design import Design, Designer, Prices, criterion_of
+from jointfrf.workbench.cli.main import main
+from jointfrf.workbench.planning.design import Design, Designer, Prices, criterion_of
 
 FREQ = np.linspace(0.5, 10, 200)
 MASSES = ["A/1:x", "A/2:x", "B/1:x", "B/2:x"]
@@ -394,7 +394,7 @@ def test_the_command_plans_frfs_of_a_case(capsys):
 
 
 def jf_cases():
-    from jointfrf.cases.catalogue import list_cases
+    from jointfrf.workbench.cases.catalogue import list_cases
 
     return list_cases()[0].parent
 

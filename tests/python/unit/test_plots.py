@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from jointfrf.report.draw import draw
-from jointfrf.report.figure import Figure, Panel, Surface, figure_csv
+from jointfrf.workbench.report.draw import draw
+from jointfrf.workbench.report.figure import Figure, Panel, Surface, figure_csv
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

@@ -9,7 +9,7 @@ import pytest
 
 import jointfrf as jf
 import jointfrf.io
-from jointfrf.cli.main import main
+from jointfrf.workbench.cli.main import main
 from new_kinds import FORMAT, LAW
 
 OURS = "jointfrf.io.file_format import FileFormat, FrfArrays"

@@ -8,9 +8,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import jointfrf as jf
-from jointfrf.cli.main import main
 from jointfrf.identification.result import Fit
-from jointfrf.report.pool_page import pool_csv
+from jointfrf.workbench.cli.main import main
+from jointfrf.workbench.report.pool_page import pool_csv
 
 
 def fit_of(k: float, c: float, error: float = 0.01) -> Fit:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.report.draw import draw
-from jointfrf.report.receptance import noise_figure, noise_panel
+from jointfrf.workbench.report.draw import draw
+from jointfrf.workbench.report.receptance import noise_figure, noise_panel
 
 NAMES = ["j:y", "j:theta", "k:y", "k:theta"]
 HUM = 40

@@ -9,10 +9,10 @@ import pytest
 from scipy import sparse
 
 import jointfrf as jf
-from jointfrf.cases.catalogue import find_case, read_case, run_case
 from jointfrf.errors import FileContentError
-from jointfrf.io.fe.matrix_formats import read_matrix
-from jointfrf.io.fe.nodes import read_nodes
+from jointfrf.workbench.cases.catalogue import find_case, read_case, run_case
+from jointfrf.workbench.fe.matrix_formats import read_matrix
+from jointfrf.workbench.fe.nodes import read_nodes
 from own_case import write_case
 
 #: Bytes that a reader may take for a file of some kB which it rejects.

@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import jointfrf as jf
-from jointfrf.cli.main import main
+from jointfrf.workbench.cli.main import main
 
 FREQ = np.linspace(0.5, 10, 300)
 FILE = Path(__file__).resolve().parents[3] / "cases/hammer-test/two_bars.uff"

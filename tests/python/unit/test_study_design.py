@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.cases.catalogue import find_case, read_case
-from jointfrf.studies.design import parse_factor
+from jointfrf.workbench.cases.catalogue import find_case, read_case
+from jointfrf.workbench.studies.design import parse_factor
 
 FOLDER = find_case("3.3")
 CASE = read_case(FOLDER)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.cases.kind import EstimateColumn, EstimateGroup, Estimates
-from jointfrf.studies.run import Schedule
-from jointfrf.studies.store import GroupRecord, Span, StudyRecord, StudyStore
-from jointfrf.studies.summary import summarise
+from jointfrf.workbench.cases.kind import EstimateColumn, EstimateGroup, Estimates
+from jointfrf.workbench.studies.run import Schedule
+from jointfrf.workbench.studies.store import GroupRecord, Span, StudyRecord, StudyStore
+from jointfrf.workbench.studies.summary import summarise
 
 COUNT = 1000
 COLUMNS = tuple(
@@ -61,7 +61,7 @@ def test_moments_are_those_of_all_realisations(whole, drawn):
 
 
 def test_percentiles_of_very_many_are_those_of_the_first(whole, drawn, monkeypatch):
-    monkeypatch.setattr("jointfrf.studies.summary._SAMPLE", 30)
+    monkeypatch.setattr("jointfrf.workbench.studies.summary._SAMPLE", 30)
     row = summarise(StudyStore(whole.folder), whole.record)[0]
     assert row.median == np.median(drawn.values[:10, 0])
     assert row.mean == pytest.approx(drawn.values[:, 0].mean(), rel=1e-12)

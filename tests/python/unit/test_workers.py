@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.cases.workers import RankedProcesses, Workers, started_workers
 from jointfrf.parallel.pool import can_start_processes, opened_pool, started_processes
+from jointfrf.workbench.cases.workers import RankedProcesses, Workers, started_workers
 
 _PARENT = """
 import os, sys, time
-from jointfrf.cases.workers import started_workers
+from jointfrf.workbench.cases.workers import started_workers
 
 def nap(seconds):
     time.sleep(seconds)
@@ -66,7 +66,7 @@ def test_a_killed_parent_leaves_no_process(tmp_path):
 
 _IN_A_FOLDER = """
 import sys
-from jointfrf.cases.workers import started_workers
+from jointfrf.workbench.cases.workers import started_workers
 from jointfrf.parallel.pool import opened_pool
 
 if __name__ == "__main__":

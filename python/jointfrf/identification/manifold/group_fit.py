@@ -47,11 +47,11 @@ _MOST = 25
 _MOVED = 0.02
 #: Steps of the projection: of the first one, of those that follow a small change of the joint, of lines started again.
 _FIRST_STEPS, _NEXT_STEPS, _OTHER_STEPS = 30, 8, 25
-#: A line that stays farther from the manifold than this, in squares per unknown and of the noise, is not used.
-FAR = 3.0
-#: Of fewer lines those that were not smoothed are not used beyond what noise reaches with this probability, and so many
-#: times that for what is not known of its level.
-_NOT_SMOOTHED, _BY_CHANCE, _LEVEL = 50, 1e-3, 2.0
+#: A line is left out beyond this distance from the manifold, in squares per unknown and of the noise, and beyond the
+#: distance that noise reaches on any line with this probability.
+FAR, _BY_CHANCE = 3.0, 1e-3
+#: FRFs of fewer lines that are not smoothed: the second distance is this factor larger, as the level is uncertain.
+_NOT_SMOOTHED, _LEVEL = 50, 2.0
 #: Linearisations of a fit that stays far from the data, from the first start and from others; after twice the first
 #: number lines that are not used do not come back.
 PATIENCE, LITTLE_PATIENCE = 8, 4
@@ -403,10 +403,10 @@ class _LinesUsed:
 
     def __init__(self, problem: GroupProblem) -> None:
         data, n_freq = problem.data, len(problem.data.measured)
-        self.farthest = FAR * problem.joint.n**2
+        chance = float(special.gammainccinv(float(np.median(problem.equations())), _BY_CHANCE / n_freq))
         if n_freq < _NOT_SMOOTHED and np.allclose(data.measured, data.smooth, rtol=1e-9, atol=0):
-            chance = special.gammainccinv(float(np.median(problem.equations())), _BY_CHANCE / n_freq)
-            self.farthest = max(self.farthest, _LEVEL * float(chance))
+            chance *= _LEVEL
+        self.farthest = max(FAR * problem.joint.n**2, chance)
         self.least = max(problem.joint.lower.size, n_freq // 4)
         self.last = np.ones(n_freq, np.bool_)
 

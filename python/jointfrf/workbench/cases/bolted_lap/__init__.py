@@ -1,0 +1,33 @@
+"""A lap joint with a preloaded bolt of solid elements: measured, identified, and used again with another beam.
+
+keys         the keys of its files, and the case as data
+frfs         FRFs: of the preloaded solid model, of the beams by themselves; resonances of the tip
+routes       from measured FRFs to K*(w) by several routes, and to constants by two estimators
+compute      all of these, without noise and with it, for cases and for studies
+results      tables, numbers and figures
+"""
+
+from jointfrf.workbench.cases.bolted_lap.compute import BoltedLapResult, compute_bolted_lap, estimate_groups
+from jointfrf.workbench.cases.bolted_lap.keys import BoltedLapCase, BoltedLapExpected, BoltedLapKeys, read_bolted_lap
+from jointfrf.workbench.cases.bolted_lap.results import (
+    build_figures,
+    build_numbers,
+    build_summary,
+    build_tables,
+)
+from jointfrf.workbench.cases.kind import CaseKind
+
+__all__ = ["KIND"]
+
+KIND: CaseKind[BoltedLapCase, BoltedLapResult] = CaseKind(
+    keys=BoltedLapKeys,
+    expected_keys=BoltedLapExpected,
+    read=read_bolted_lap,
+    compute=compute_bolted_lap,
+    tables=build_tables,
+    figures=build_figures,
+    summary=build_summary,
+    numbers=build_numbers,
+    groups=estimate_groups,
+    headline=("lines-k",),
+)

@@ -1,0 +1,295 @@
+"""`jointfrf export`: a saved joint as input of a finite-element program; and the cards of `jointfrf identify`."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from jointfrf.dofs import point_and_direction
+from jointfrf.files import write_file
+from jointfrf.identification.fit_cards import cards
+from jointfrf.identification.joint_file import JointFile, read_joint_file
+from jointfrf.identification.result import Fit
+from jointfrf.io.card_link import CardFormat
+from jointfrf.io.cards import CardOptions
+from jointfrf.io.units import model_units
+from jointfrf.joint import Joint
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.laws.law_joint import LawJoint
+from jointfrf.workbench.cli.arguments.export import CardNodes
+from jointfrf.workbench.cli.usage import Output, UsageError, check_folder, warn_of_ignored
+
+__all__ = ["CardRequest", "card_request", "page_nodes", "run", "written_cards"]
+
+
+#: Arguments of `export` in its messages, and the options that stand for them.
+_OPTIONS = (
+    ("full_matrix", "--full-matrix"),
+    ("name the first of them by damping_nodes", "name the first of them by --damping-nodes N"),
+    ("damping_nodes", "--damping-nodes"),
+    ("(bounds)", "(--bounds)"),
+    ("state one frequency by freq_hz", "state one frequency by --frequency HZ"),
+    ("name one frequency by freq_hz", "name one frequency by --frequency HZ"),
+    ("leave connector out", "leave --connector out"),
+    ("and connector exclude", "and --connector exclude"),
+    ("by table_hz=", "by --frequency LOW:HIGH"),
+    ("with damping=False", "with --no-damping"),
+    ("name one in points", "name one by --joint-at"),
+)
+#: Lines of a table between which K* differs from a straight line by less than this share; it doubles so often at most.
+_STRAIGHT, _MOST_HALVINGS = 1e-3, 9
+
+
+def _table_lines(joint: Joint | LawJoint, low: float, high: float) -> FloatArray:
+    """Return lines between which Re K* and Im K*/w are nearly straight, Hz: as many as that takes."""
+    springs = joint if isinstance(joint, Joint) else LawJoint(joint.laws, per=joint.per)
+    for power in range(_MOST_HALVINGS + 1):
+        freq = np.geomspace(low, high, 2**power + 1)
+        between = (freq[1:] + freq[:-1]) / 2
+        known, exact = (springs.dynamic_stiffness(lines) for lines in (freq, between))
+        ends = known.real + 1j * known.imag / freq[:, None, None]
+        straight = (ends[1:] + ends[:-1]) / 2
+        error = abs(straight.real + 1j * straight.imag * between[:, None, None] - exact).max(axis=(1, 2))
+        if (error <= _STRAIGHT * abs(exact).max(axis=(1, 2))).all():
+            break
+    return freq
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command; the caller turns exceptions into messages."""
+    out = Output(args)
+    found = read_joint_file(args.joint)
+    if args.point is not None or not isinstance(args.export[1], dict):
+        found = _at_point(found, args.point)
+    at = args.frequency if isinstance(args.frequency, float) else None
+    if isinstance(found.joint, Joint) and at is not None:
+        warn_of_ignored(args, ("--frequency",), "no law of this joint depends on frequency")
+    if args.nodes_at is None:
+        warn_of_ignored(args, ("--joint-at",), "without --nodes-at the nodes are at the joint")
+    is_table = isinstance(args.frequency, tuple)
+    damping, cross = ("none", "zero") if is_table else _terms(_springs(found.joint, at))
+    request = card_request(args, found.joint.dofs, damping=damping, cross=cross, points=_points(args, found))
+    assert request is not None
+    if is_table and (isinstance(found.joint, Joint) or found.joint.laws):
+        request.options["table_hz"] = _table_lines(found.joint, *args.frequency)
+    if found.fit is not None:
+        text = written_cards(found.fit, request, found.about, at if found.fit.laws is not None else None)
+    else:
+        text = _by_hand(found, request, at)
+        if request.output is not None:
+            write_file(request.output, text)
+    written = [] if args.output is None else [str(args.output)]
+    out.say(f"wrote {args.output}" if written else text.rstrip("\n"))
+    out.give({"source": str(args.joint), "program": request.program, "cards": text, "written": written})
+    return 0
+
+
+def _by_hand(found: JointFile, request: CardRequest, freq_hz: float | None) -> str:
+    """Return the cards of a joint that was written by hand."""
+    options: CardOptions = {**request.options, "comments": found.about}
+    if isinstance(request.nodes, dict):
+        raise UsageError("the file has one joint without a name; give its nodes as PROGRAM:J,K")
+    try:
+        if isinstance(found.joint, LawJoint):
+            return found.joint.export(request.program, request.nodes, freq_hz=freq_hz, **options)
+        joint, left_out = (found.joint, ()) if request.all_damping else _without_negative(found.joint)
+        options["comments"] = [*found.about, *left_out]
+        return joint.export(request.program, request.nodes, **options)
+    except ValueError as error:
+        raise UsageError(_refusal(str(error), "")) from error
+
+
+def _at_point(found: JointFile, point: str | None) -> JointFile:
+    """Return the one of several joint points that is named; the joint itself where it has no points."""
+    known = () if found.fit is None else found.fit.points
+    if point is None and not known:
+        return found
+    if found.fit is None or point not in known:
+        raise UsageError(
+            f"--point is {point!r}; use one of {', '.join(known)}"
+            if known and point is not None
+            else "the file has no joint points; leave out --point"
+            if point is not None
+            else f"the file has joint points {', '.join(known)}; name one by --point, or all by PROGRAM:NAME=J,K:..."
+        )
+    fit = found.fit.at_point(point)
+    return found._replace(fit=fit, joint=fit.joint, about=(*found.about, f"joint point {point}"))
+
+
+def _without_negative(joint: Joint) -> tuple[Joint, list[str]]:
+    """Return a joint without the dashpots that are negative, with their cross terms, and a sentence for each."""
+    left_out, kept = [], (joint.damping.copy(), joint.structural_damping.copy())
+    for letter, matrix in zip("ch", kept, strict=True):
+        for i in np.flatnonzero(matrix.diagonal() < 0):
+            left_out.append(f"{letter}_{joint.dofs[i]} = {matrix[i, i]:.5g}: negative, left out with its cross terms")
+            matrix[i], matrix[:, i] = 0, 0
+    return Joint(joint.stiffness, kept[0], joint.dofs, joint.loss_factor, kept[1]), left_out
+
+
+def _springs(joint: Joint | LawJoint, freq_hz: float | None) -> Joint | None:
+    """Return the springs and dampers of a joint; None where it has none.
+
+    Raises
+    ------
+    UsageError
+        A law depends on frequency, and none was named.
+    """
+    if isinstance(joint, Joint):
+        return joint
+    try:
+        return LawJoint(joint.laws, per=joint.per).constant_joint(freq_hz) if joint.laws else None
+    except ValueError as error:
+        raise UsageError(_refusal(str(error), "")) from error
+
+
+def _terms(joint: Joint | None) -> tuple[str, str]:
+    """Return kinds of damping, and whether DOFs are coupled, in the words of `identify`."""
+    if joint is None:
+        return "none", "zero"
+    kinds = {(True, True): "both", (True, False): "viscous", (False, True): "hysteretic", (False, False): "none"}
+    k = joint.stiffness
+    coupled = bool((k != np.diag(k.diagonal())).any())
+    return kinds[bool(joint.damping.any()), bool(joint.hysteretic_stiffness.any())], "fit" if coupled else "zero"
+
+
+def _points(args: argparse.Namespace, found: JointFile) -> FloatArray | None:
+    if args.joint_at is not None:
+        return np.tile(args.joint_at, (2, 1)) * model_units(args.units).length
+    return found.points
+
+
+class CardRequest(NamedTuple):
+    """What is to be written, and where.
+
+    Attributes
+    ----------
+    program : str
+    nodes : list of int, or dict of these
+        j and k; of several joints by their names, with ROT NODEs of CalculiX.
+    options : CardOptions
+    all_damping, bounds : bool
+    output : Path or None
+        None: to be printed.
+    """
+
+    program: CardFormat
+    nodes: CardNodes
+    options: CardOptions
+    all_damping: bool
+    bounds: bool
+    output: Path | None
+
+
+def page_nodes(args: argparse.Namespace) -> Sequence[int]:
+    """Return the nodes in the cards that a page shows: those of one joint, where they are named."""
+    return (1, 2) if args.export is None or isinstance(args.export[1], dict) else args.export[1]
+
+
+def card_request(
+    args: argparse.Namespace, dofs: Sequence[str], *, damping: str, cross: str, points: FloatArray | None
+) -> CardRequest | None:
+    """Return what is to be written, after a look at whether the program can hold such a joint.
+
+    Parameters
+    ----------
+    args : Namespace
+    dofs : sequence of str
+        Joint DOFs.
+    damping, cross : str
+        Terms that the joint may have.
+    points : ndarray, shape (2, 3), or None
+        Reference points of the sides, m.
+
+    Raises
+    ------
+    UsageError
+        The program cannot hold it, or a number is out of range.
+    """
+    if args.export is None:
+        for name in ("--output", "--nodes-at", "--units", "--faces"):
+            if name.removeprefix("--").replace("-", "_") in args.given:
+                raise UsageError(f"{name} is for cards; add --export PROGRAM:J,K")
+        flags = ("--element", "--property", "--full-matrix", "--connector", "--all-damping", "--bounds", "--no-damping",
+                 "--damping-nodes")  # fmt: skip
+        warn_of_ignored(args, flags, "no cards are written without --export PROGRAM:J,K")
+        return None
+    check_folder("--output", args.output)
+    program, ends = args.export
+    of_joints = ends if isinstance(ends, dict) else {}
+    _check_joints(args, dofs, of_joints)
+    options: CardOptions = {
+        "element": args.element,
+        "number": args.property,
+        "rotation_nodes": None if of_joints else ends[2:] or None,
+        "damping": not args.no_damping and (program != "calculix" or args.damping_nodes is not None),
+        "damping_nodes": args.damping_nodes,
+        "full_matrix": args.full_matrix,
+        "connector": args.connector,
+        "units": args.units,
+        "faces": args.faces,
+    }
+    if args.nodes_at is not None:
+        options["positions"] = np.array(args.nodes_at)
+        if points is not None:
+            options["points"] = points / model_units(args.units).length
+    request = CardRequest(program, of_joints or ends[:2], options, args.all_damping, args.bounds, args.output)
+    try:
+        for name, own in (of_joints or {"": ends}).items():
+            held = [dof for point, dof in map(point_and_direction, dofs) if point == name]
+            whole: CardOptions = {**options, "rotation_nodes": own[2:] or None}
+            _probe(len(held), held, damping, cross).export(program, own[:2], **whole)
+    except ValueError as error:
+        raise UsageError(_refusal(str(error), damping)) from error
+    return request
+
+
+def _check_joints(args: argparse.Namespace, dofs: Sequence[str], of_joints: Mapping[str, list[int]]) -> None:
+    """Raise an error unless each joint has its nodes, and only these."""
+    known = list(dict.fromkeys(point for point, _ in map(point_and_direction, dofs)))
+    if sorted(of_joints) != sorted(known) and (of_joints or len(known) > 1):
+        example = ":".join(f"{name}={9001 + 2 * i},{9002 + 2 * i}" for i, name in enumerate(known) if name)
+        raise UsageError(
+            f"--export does not name the nodes of each joint ({', '.join(filter(None, known)) or 'unnamed'}); use "
+            + (f"{args.export[0]}:{example}" if example else f"{args.export[0]}:9001,9002")
+        )
+    for name, given in (("--nodes-at", args.nodes_at), ("--faces", args.faces)):
+        if of_joints and given is not None:
+            raise UsageError(f"{name} takes one joint; use --save, then jointfrf export FILE PROGRAM:J,K --point NAME")
+
+
+def _probe(n: int, dofs: Sequence[str], damping: str, cross: str) -> Joint:
+    """Return a joint with every term that the one to be found may have."""
+    matrix = np.eye(n) + (0.1 if cross in ("fit", "points") else 0.0) * (1 - np.eye(n))
+    viscous = matrix if damping in ("viscous", "both", "auto") else None
+    hysteretic = matrix if damping in ("hysteretic", "both", "auto") else None
+    return Joint(matrix, viscous, dofs, structural_damping=hysteretic)
+
+
+def _refusal(why: str, damping: str) -> str:
+    """Return an error of an export in the words of the command line."""
+    if "MATRIX27" in why and damping:
+        may = f"--damping {damping} may find" if damping == "auto" else f"--damping {damping} fits"
+        return f"MATRIX27 of ansys has no hysteretic damping, which {may}; use --damping viscous, or --no-damping"
+    if "in rotation_nodes" in why:
+        return "calculix has rotations at ROT NODEs of rigid bodies only; name both, calculix:J,K,ROTJ,ROTK"
+    for argument, option in _OPTIONS:
+        why = why.replace(argument, option)
+    return why
+
+
+def written_cards(fit: Fit, request: CardRequest, about: Sequence[str], freq_hz: float | None = None) -> str:
+    """Return the cards of a fit, laws at a frequency, and write them where that is wanted."""
+    try:
+        text = cards(
+            fit, request.program, request.nodes, about=about, all_damping=request.all_damping, bounds=request.bounds,
+            freq_hz=freq_hz, **request.options,
+        )  # fmt: skip
+    except ValueError as error:
+        raise UsageError(_refusal(str(error), "")) from error
+    if request.output is not None:
+        write_file(request.output, text)
+    return text

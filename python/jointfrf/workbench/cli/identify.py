@@ -1,0 +1,356 @@
+"""`jointfrf identify`: from measured FRFs to the parameters of a joint."""
+
+from __future__ import annotations
+
+import argparse
+import warnings
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jointfrf.channels.check.check import stop_at_errors
+from jointfrf.channels.check.result import FrfCheck
+from jointfrf.channels.point_lines import difference_error
+from jointfrf.dofs import is_rotation
+from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
+from jointfrf.extras import check_extras
+from jointfrf.frf.noise_model import estimate_noise
+from jointfrf.identification.band_means import identify_band_mean
+from jointfrf.identification.identify import identify
+from jointfrf.identification.record import fit_to_dict, write_record
+from jointfrf.identification.result import Fit
+from jointfrf.identification.side_models import SideModel
+from jointfrf.io import FrfSet
+from jointfrf.laws.law_joint import LawJoint
+from jointfrf.workbench.assembly_file.side_part import SidePart, read_side
+from jointfrf.workbench.cli.arguments.measured_file import shown_nodes
+from jointfrf.workbench.cli.check import check_joint
+from jointfrf.workbench.cli.export import CardRequest, card_request, page_nodes, written_cards
+from jointfrf.workbench.cli.identify_model import run_model
+from jointfrf.workbench.cli.joint_laws import joint_of_laws
+from jointfrf.workbench.cli.masses import check_masses, check_stated, scale_of_fit
+from jointfrf.workbench.cli.measured_file import file_names, in_some_band, read_measured, setups_with_gains
+from jointfrf.workbench.cli.measured_joint import MeasuredJoint, measured_joint
+from jointfrf.workbench.cli.noise import stated_noise
+from jointfrf.workbench.cli.usage import (
+    Interrupt,
+    Output,
+    UsageError,
+    check_folder,
+    check_out,
+    plain,
+    waiting,
+    warn_of_ignored,
+)
+from jointfrf.workbench.report.fit_page import write_report
+
+__all__ = ["run"]
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command; the caller turns exceptions into messages."""
+    _check_results(args)
+    if args.model is not None:
+        _refuse(args, ("points", "same"), "is for FRFs at the joint; leave it out with --model")
+        return run_model(args)
+    _refuse(args, ("each", "find_wrong_channels"), "needs --model; name the assembly.toml")
+    out = Output(args)
+    _check_points(args)
+    _check_window(args)
+    check_stated(args)
+    stated_noise(args)
+    with waiting(f"reading {file_names(args)}"):
+        measured = read_measured(args)
+        frfs = measured.receptance(args.window_decay or 0.0)
+    joint = measured_joint(args, frfs, args.bending_stiffness)
+    laws = joint_of_laws(args, joint.dofs)
+    sides = _sides(args, frfs, joint)
+    points = np.array(joint.responses.references)
+    damping = args.damping if laws is None else "none"
+    request = card_request(args, joint.dofs, damping=damping, cross=args.cross, points=points)
+    with waiting("data checks"):
+        check = check_joint(joint, measured)
+    stop_at_errors(check.findings, args.accept or ())
+    _warn(args, joint, check)
+    _warn_of_far_points(frfs, joint)
+    out.say(*_heading(args, frfs, joint), *(line for side in sides for line in side.text))
+    fits, interrupt = list[Fit](), Interrupt()
+    with interrupt.kept_back(fits):
+        for method in args.method:
+            with waiting(f"fit by {method}"):
+                fit = _fit(args, method, frfs, joint, laws, tuple(side.model for side in sides))
+                fits.append(fit.with_findings_of_data(check.findings))
+            scale = scale_of_fit(fits[-1])
+            check_masses(args, scale, sides)
+            out.say("", fits[-1], *scale.text())
+            out.warn(*fits[-1].warnings)
+    with waiting("results"):
+        text, written = _write_results(args, frfs, joint, fits, request)
+    if text and args.output is None:
+        out.say("", text.rstrip("\n"))
+    out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
+    out.give(_content(args, joint, check, fits, text, written))
+    interrupt.resume()
+    return 0
+
+
+def _check_results(args: argparse.Namespace) -> None:
+    """Raise an error for results that cannot be written, before anything is read."""
+    if args.out is not None:
+        check_extras("matplotlib")
+        check_out("--out", args.out)
+    if args.report is not None:
+        check_extras("jinja2")
+        if "compliance" not in args.method:
+            raise UsageError("--report needs method compliance; add it to --method")
+        check_out("--report", args.report.parent)
+        if args.report.is_dir():
+            raise UsageError(f"--report: {args.report} is a folder; name a file")
+    check_folder("--save", args.save)
+
+
+def _refuse(args: argparse.Namespace, names: tuple[str, ...], why: str) -> None:
+    """Raise an error for the first of these options that is given."""
+    for name in names:
+        if getattr(args, name):
+            raise UsageError(f"--{name.replace('_', '-')} {why}")
+
+
+def _check_points(args: argparse.Namespace) -> None:
+    """Raise an error for options that do not go with the number of joint points."""
+    if args.save is None:
+        warn_of_ignored(args, ("--save-lines",), "nothing is saved without --save")
+    if args.points is None:
+        _refuse(args, ("same",), "needs several joint points; name them by --points")
+        if args.cross == "points":
+            raise UsageError("--cross points needs several joint points; name them by --points")
+    else:
+        unknown = [name for own in args.same or () for name in own if name not in args.points]
+        if unknown:
+            raise UsageError(f"unknown joint point {unknown[0]} in --same; use names of --points")
+        _refuse(args, ("side_j", "side_k"), "is for one joint point; leave out --points")
+
+
+def _check_window(args: argparse.Namespace) -> None:
+    """Raise an error for options that do not go with an exponential window."""
+    if args.window_decay is not None and not args.window_decay >= 0:
+        raise UsageError(f"--window-decay must not be negative, not {args.window_decay:g}")
+    if args.window_decay:
+        why = "does not go with --window-decay, which corrects springs and dampers by method compliance; leave one out"
+        _refuse(args, ("law", "joint", "side_j", "side_k"), why)
+        if args.method != ["compliance"]:
+            raise UsageError(f"--method {','.join(args.method)} {why}")
+
+
+def _warn(args: argparse.Namespace, joint: MeasuredJoint, check: FrfCheck) -> None:
+    """Warn of DOFs that the joint leaves out, and of options that are not used."""
+    for text in joint.warnings(check):
+        warnings.warn(text, FrfCheckWarning, stacklevel=3)
+    if "compliance" not in args.method:
+        warn_of_ignored(
+            args,
+            (
+                "--damping",
+                "--cross",
+                "--noise",
+                "--floor",
+                "--setup-gain",
+                "--common-gain",
+                "--sensor-mass",
+                "--window-decay",
+                "--position-error",
+            ),
+            f"method {args.method[0]} uses no such option",
+        )
+    if joint.channels is not None or len(joint.nodes[0]) == 1:
+        warn_of_ignored(args, ("--bending-stiffness",), "no rotation is found by differences along a line")
+
+
+def _warn_of_far_points(frfs: FrfSet, joint: MeasuredJoint) -> None:
+    """Warn of points along lines if the nearest two of each side have reference points less than half as far apart."""
+    places = [[frfs.coordinates.get(node) for node in own] for own in joint.nodes]
+    if joint.channels is not None or joint.is_of_points or any(at is None for own in places for at in own):
+        return
+    lines = [np.array(own) for own in places]
+    apart = float(np.linalg.norm(np.subtract(*joint.responses.references)))
+    if min(map(len, lines)) <= 2:
+        return
+    # The two points of each side that are nearest to the other side.
+    near = [np.sort(np.argsort(np.linalg.norm(own[:, None] - other, axis=2).min(axis=1), kind="stable")[:2])
+            for own, other in (lines, lines[::-1])]  # fmt: skip
+    nearer = float(np.linalg.norm(lines[0][near[0]].mean(axis=0) - lines[1][near[1]].mean(axis=0)))
+    if nearer < apart / 2:
+        j, k = (",".join(str(nodes[i]) for i in at) for nodes, at in zip(joint.nodes, near, strict=True))
+        text = (
+            f"reference points {1e3 * apart:.3g} mm apart make the parts between them belong to the joint; use "
+            f"--j {j} --k {k} ({1e3 * nearer:.3g} mm)"
+        )
+        warnings.warn(text, FrfCheckWarning, stacklevel=3)
+
+
+def _write_results(
+    args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, fits: list[Fit], request: CardRequest | None
+) -> tuple[str, list[Path]]:
+    """Write what the options ask for; return the cards and the files written."""
+    text, written = "", []
+    if args.save is not None:
+        _save(args.save, fits[0], file_names(args), joint, lines=args.save_lines)
+        written.append(args.save)
+    if request is not None:
+        text = written_cards(fits[0], request, [f"from {file_names(args)}", *_places(joint)])
+        written += [] if args.output is None else [args.output]
+    finished = dict(zip(args.method, fits, strict=False))
+    if args.report is not None and "compliance" in finished:
+        fit = finished["compliance"]
+        args.report.parent.mkdir(parents=True, exist_ok=True)
+        written.append(write_report(fit, args.report, source=file_names(args), command=args.typed,
+                                    nodes=page_nodes(args)))  # fmt: skip
+    if args.out is not None:
+        written += _write_figures(args, frfs, joint, fits)
+    return text, written
+
+
+def _content(
+    args: argparse.Namespace,
+    joint: MeasuredJoint,
+    check: FrfCheck,
+    fits: list[Fit],
+    text: str,
+    written: list[Path],
+) -> dict[str, Any]:
+    return {
+        "sources": [str(path) for path in args.files],
+        "joint": joint.to_dict(),
+        "checks": check.to_dict(),
+        "warnings": [*joint.warnings(check), *(text for fit in fits for text in fit.warnings)],
+        "fits": [fit_to_dict(fit, lines=False) for fit in fits],
+        "scales": [asdict(scale_of_fit(fit)) for fit in fits],
+        "cards": text or None,
+        "written": [str(path) for path in written],
+    }
+
+
+def _heading(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint) -> Iterator[str]:
+    """Say what is identified from what."""
+    points = " and ".join(
+        shown_nodes(side) if joint.channels is not None else ", ".join(map(str, side)) for side in joint.nodes
+    )
+    size = f"{frfs.h.shape[1]} responses x {frfs.h.shape[2]} excitations"
+    yield f"{file_names(args)}: {size}; joint between points {points}"
+    yield from joint.text()
+    if joint.channels is None and len(joint.nodes[0]) > 1 and not joint.is_of_points:
+        yield from _differences(args, joint)
+
+
+def _differences(args: argparse.Namespace, joint: MeasuredJoint) -> Iterator[str]:
+    """Say what the central differences do to a rotational joint stiffness, before the result is read."""
+    rotations = [i for i, dof in enumerate(joint.dofs) if is_rotation(dof)]
+    if not rotations:
+        return
+    reach = 1 / abs(joint.responses.transform[rotations[0]]).max() / 2
+    yield f"rotations by central differences over +-{1e3 * reach:.3g} mm"
+    if args.bending_stiffness is not None:
+        error = difference_error(reach, args.bending_stiffness, 1.0)
+        yield (
+            f"they add about dx/(3 E I) = {error.compliance:.3g} rad/(N m) to the compliance of a rotational DOF: "
+            f"a joint much stiffer than {1 / error.compliance:.3g} N m/rad cannot be distinguished from a rigid one"
+        )
+
+
+def _sides(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint) -> list[SidePart]:
+    """Read the models of both sides; none where none are named."""
+    paths = [path for path in (args.side_j, args.side_k) if path is not None]
+    if not paths:
+        return []
+    if len(paths) == 1:
+        raise UsageError("only one side has a model; give both --side-j and --side-k")
+    if "compliance" not in args.method:
+        raise UsageError("--side-j and --side-k need method compliance; add it to --method")
+    lines, _ = in_some_band(frfs.freq_hz, joint.h, args.band)
+    found = []
+    for side, path in enumerate(paths):
+        responses, forces = joint.placed(side, frfs.coordinates)
+        found.append(read_side(path, lines, responses, forces, len(joint.dofs)))
+    return found
+
+
+def _fit(
+    args: argparse.Namespace,
+    method: str,
+    frfs: FrfSet,
+    joint: MeasuredJoint,
+    laws: LawJoint | None,
+    sides: tuple[SideModel, ...],
+) -> Fit:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IdentificationWarning)  # they are in the table
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        warnings.simplefilter("ignore", FrfCheckWarning)  # printed with the names of the channels
+        if method == "compliance":
+            options = _of_compliance(args, frfs, joint, laws)
+            if sides:
+                options["sides"] = sides
+            return identify(frfs.freq_hz, joint.h, joint.dofs, args.band, **options)
+        transform = joint.responses if joint.is_square else None
+        return identify_band_mean(
+            frfs.freq_hz, _square(joint), "inverse-substructuring", joint.dofs, args.band, transform=transform
+        )
+
+
+def _square(joint: MeasuredJoint) -> np.ndarray:
+    """FRFs as means over bands take them, which know one transform only."""
+    if joint.is_square:
+        return joint.h
+    return np.ascontiguousarray(joint.responses.transform @ joint.h @ joint.forces.transform.T)
+
+
+def _of_compliance(
+    args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, laws: LawJoint | None
+) -> dict[str, Any]:
+    """Return the options of the compliance fit: what is known of the channels, damping, cross terms, noise."""
+    noise = stated_noise(args)
+    known = joint.known(frfs, is_noise_stated=noise is not None)
+    terms = {"damping": args.damping, "cross": args.cross} if laws is None else {"joint": laws}
+    if args.same is not None:
+        terms["same"] = args.same
+    return {
+        **known,
+        "noise": noise,
+        "setups": setups_with_gains(args, known["setups"], joint.h.shape),
+        "accept": args.accept or (),
+        "sensor_mass": args.sensor_mass,
+        **({"window_decay": args.window_decay} if args.window_decay is not None else {}),
+        **({"position_error": args.position_error} if args.position_error is not None else {}),
+        **terms,
+    }
+
+
+def _places(joint: MeasuredJoint) -> list[str]:
+    """Say where the reference points are."""
+    one, other = joint.responses.references
+    if np.array_equal(one, other):
+        return [f"reference point x, y, z = {', '.join(f'{value:.6g}' for value in one + 0.0)} m"]
+    both = [", ".join(f"{value:.6g}" for value in place + 0.0) for place in (one, other)]
+    return [f"reference points x, y, z = {both[0]} m (j) and {both[1]} m (k)"]
+
+
+def _save(path: Path, fit: Fit, source: str, joint: MeasuredJoint, *, lines: bool) -> None:
+    about: dict[str, Any] = {"source": source}
+    if not joint.is_of_points:
+        about["reference_points_m"] = plain(dict(zip("jk", joint.responses.references, strict=True)))
+    write_record(path, fit_to_dict(fit, lines=lines) | about)
+
+
+def _write_figures(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, fits: list[Fit]) -> list[Path]:
+    from jointfrf.workbench.report.fit import write_fit
+    from jointfrf.workbench.report.receptance import noise_figure
+
+    figures = []
+    if "compliance" in args.method and args.noise is None:
+        freq_hz, h = in_some_band(frfs.freq_hz, joint.h, args.band)
+        names = [[str(channel) for channel in side.channels] for side in (joint.responses, joint.forces)]
+        figures.append(noise_figure(freq_hz, h, estimate_noise(freq_hz, h), *names))
+    return write_fit(fits, args.out, file_names(args), figures)

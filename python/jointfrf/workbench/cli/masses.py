@@ -1,0 +1,88 @@
+"""Masses on the command line: what the FRFs say of them, and what the user states."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from jointfrf.errors import FileContentError
+from jointfrf.frf.noise_model import estimate_noise
+from jointfrf.identification.apparent_mass import ApparentScale, apparent_scale, model_mass
+from jointfrf.identification.fit_data import FitData
+from jointfrf.identification.result import Fit
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.models.model import Model
+from jointfrf.workbench.assembly_file.side_part import SidePart
+from jointfrf.workbench.cli.measured_file import in_some_band
+from jointfrf.workbench.cli.measured_joint import MeasuredJoint
+from jointfrf.workbench.cli.usage import UsageError
+
+__all__ = ["check_masses", "check_stated", "scale_of_fit", "scale_of_joint"]
+
+#: Options of stated masses, and the sides that they are of.
+_OPTIONS = {"mass_j": "j", "mass_k": "k", "mass": "j and k"}
+#: Lines of a look: those on the mass line are the lowest.
+_LINES = 400
+
+
+def check_stated(args: argparse.Namespace) -> None:
+    """Raise an error for a mass that is none."""
+    for name in _OPTIONS:
+        value = getattr(args, name)
+        if value is not None and not 0 < value < np.inf:
+            raise UsageError(f"--{name.replace('_', '-')} must be positive, not {value:g}; state it in kg")
+
+
+def scale_of_fit(fit: Fit) -> ApparentScale:
+    """Return what the FRFs of a fit at the joint say of masses; nothing for other fits."""
+    data = fit.data
+    if not isinstance(data, FitData):
+        return ApparentScale()
+    variance = data.variance * data.variance_scale
+    return _scale(fit.freq_hz, data.measured, variance, data.responses, data.forces, fit.dofs)
+
+
+def scale_of_joint(joint: MeasuredJoint) -> ApparentScale:
+    """Return what the FRFs of a joint say of masses, without a fit; nothing where some are missing."""
+    freq, h = in_some_band(joint.freq_hz, joint.h, joint.bands)
+    freq, h = freq[:_LINES], np.ascontiguousarray(h[:_LINES])
+    if not np.isfinite(h).all():
+        return ApparentScale()
+    try:
+        noise = estimate_noise(freq, h)
+    except ValueError:  # too few lines to find it
+        return ApparentScale()
+    variance = noise.inflation * noise.variance
+    scale = _scale(freq, h, variance, joint.responses.transform, joint.forces.transform, joint.dofs)
+    # How far sides deform between the channels of virtual points shows in a fit only.
+    return scale if joint.channels is None else replace(scale, masses=scale.of_both)
+
+
+def _scale(
+    freq: FloatArray, h: ComplexArray, variance: FloatArray, responses: FloatArray, forces: FloatArray,
+    dofs: Sequence[str],
+) -> ApparentScale:  # fmt: skip
+    used = np.isfinite(variance).all(axis=(1, 2))
+    gamma, spread = responses @ h[used] @ forces.T, responses**2 @ variance[used] @ (forces**2).T
+    return apparent_scale(freq[used], gamma, spread, dofs)
+
+
+def check_masses(args: argparse.Namespace, scale: ApparentScale, sides: Sequence[SidePart] = ()) -> None:
+    """Raise an error for a mass, stated by an option or by the model of a side, that the FRFs contradict.
+
+    Raises
+    ------
+    FileContentError
+    """
+    stated = [(f"--{name.replace('_', '-')}", side, getattr(args, name)) for name, side in _OPTIONS.items()]
+    for name, side, part in zip(("--side-j", "--side-k"), "jk", sides, strict=False):
+        own, seen = part.model.part, scale.of_side(side)
+        if seen is not None and isinstance(own.source, Model):
+            stated.append((name, side, model_mass(own.source, seen.direction)))
+    for name, side, value in stated:
+        wrong = None if value is None else scale.contradiction(side, value)
+        if wrong is not None:
+            raise FileContentError(f"{wrong}: correct the unit of the FRFs, or {name}")

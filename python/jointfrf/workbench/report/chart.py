@@ -1,0 +1,289 @@
+"""Figures as parts of a page: curves as paths of an SVG image of any width, axes as text; a script zooms."""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.workbench.report.axes import axis_values, prefixed_unit, tick_texts, value_text
+from jointfrf.workbench.report.draw import STYLES, Style
+from jointfrf.workbench.report.figure import Curve, Figure, Panel, Ribbon
+
+__all__ = ["Chart", "chart_view", "count_points", "style_rules", "thinned_dots", "thinned_line"]
+
+#: Units of the paths along x and y: what a screen cannot show at full width may still be seen when zoomed in.
+_WIDE, _HIGH = 20000, 8000
+#: How far off the panel a curve is drawn, in heights of it.
+_OFF = 3
+#: Numbers along x and along y that fit beside each other on a narrow screen.
+_MOST_X, _MOST_Y = 6, 5
+#: A step along x so many times longer than those beside it parts a curve.
+_GAP = 6.0
+#: Decades of a logarithmic axis from which on only powers of ten are written.
+_DECADES = 2.0
+#: Dots and outlying lines, points wide.
+_DOT, _CROSS = 2.4, 4.0
+#: Dashes of matplotlib's names, in widths of the line.
+_DASHES = {"-": (), "--": (4, 2), ":": (1, 1.8), "-.": (6, 2, 1, 2)}
+#: Lightness of colours on a dark page: from, to.
+_DARK = (0.36, 0.92)
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A figure that readers can zoom: `alt` says in words what it shows, `most` how many points a curve may have."""
+
+    figure: Figure
+    alt: str
+    most: int = 4000
+
+
+def count_points(figures: Iterable[Figure]) -> list[int]:
+    """Return the number of points of every curve of figures."""
+    return [curve.x.size for figure in figures for panel in figure.panels for curve in panel.curves]
+
+
+def chart_view(chart: Chart) -> dict[str, Any]:
+    """Return what the template shows of a chart."""
+    figure = chart.figure
+    panels = [_panel_view(panel, chart.most) for panel in figure.panels if not panel.is_blank]
+    legend: dict[str, str] = {}
+    for panel in figure.panels:
+        for curve in panel.curves:
+            legend.setdefault(curve.label, f"s-{curve.style}")
+        for ribbon in panel.ribbons:
+            legend.setdefault(ribbon.label, f"r-{ribbon.style}")
+    return {
+        "key": figure.key,
+        "caption": figure.caption,
+        "alt": chart.alt,
+        "legend": legend,
+        "panels": panels,
+        "columns": figure.columns,
+        "wide": _WIDE,
+        "high": _HIGH,
+    }
+
+
+def _panel_view(panel: Panel, most: int) -> dict[str, Any]:
+    x_low, x_high = _x_limits(panel)
+    low, high = _y_limits(panel)
+    quantity, comma, unit = panel.y_label.rpartition(", ")
+    is_decades = panel.log_y and high - low >= _DECADES
+    largest = 10**high if panel.log_y else max(abs(low), abs(high))
+    shown_unit, size = (unit, 1.0) if is_decades else prefixed_unit(unit, largest)
+
+    def place_x(x: FloatArray) -> FloatArray:
+        return (x - x_low) / (x_high - x_low) * _WIDE
+
+    def place_y(y: FloatArray) -> FloatArray:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            value = np.log10(y) if panel.log_y else y
+            up = (value - low) / (high - low)
+        return (1 - np.clip(np.where(np.isfinite(up), up, np.nan), -_OFF, 1 + _OFF)) * _HIGH
+
+    x_values, y_values = axis_values(x_low, x_high, _MOST_X), axis_values(low, high, _MOST_Y, log=panel.log_y)
+    if panel.y_step is not None:
+        first = np.ceil(low / panel.y_step) * panel.y_step
+        y_values = np.arange(first, high + 1e-9, panel.y_step).tolist()
+    y_places = place_y(10.0 ** np.array(y_values) if panel.log_y else np.array(y_values))
+    x_places = place_x(np.array(x_values))
+    curves = [
+        {"style": f"s-{curve.style}", "label": curve.label, "path": _path(curve, place_x, place_y, most)}
+        for curve in panel.curves
+    ]
+    areas = [{"style": f"r-{own.style}", "path": _area(own, place_x, place_y)} for own in panel.ribbons]
+    return {
+        "title": panel.title,
+        "y_label": f"{quantity}{comma}{shown_unit}",
+        "x_label": panel.x_label,
+        "unit": unit,
+        "limits": {
+            "x": [x_low, x_high], "y": [low, high], "log": panel.log_y, "size": size, "step": panel.y_step,
+        },
+        "x_ticks": [(100 * float(p) / _WIDE, t) for p, t in zip(x_places, tick_texts(x_values), strict=True)],
+        "y_ticks": [
+            (100 * (1 - float(p) / _HIGH), text)
+            for p, text in zip(y_places, _y_texts(y_values, size, log=panel.log_y, decades=is_decades), strict=True)
+        ],
+        "grid": "".join(f"M{p:.0f} 0V{_HIGH}" for p in x_places)
+        + "".join(f"M0 {p:.0f}H{_WIDE}" for p in y_places),
+        "areas": areas,
+        "curves": curves,
+        "height": panel.height,
+    }  # fmt: skip
+
+
+def _y_texts(values: Sequence[float], size: float, *, log: bool, decades: bool) -> list[str]:
+    if decades:
+        return [value_text(10.0**value) for value in values]
+    return tick_texts([(10.0**value if log else value) / size for value in values])
+
+
+def _x_limits(panel: Panel) -> tuple[float, float]:
+    if panel.x_limits:
+        return panel.x_limits
+    low = min(float(curve.x[0]) for curve in panel.curves if curve.x.size)
+    high = max(float(curve.x[-1]) for curve in panel.curves if curve.x.size)
+    return (low, high) if high > low else (low - 0.5, high + 0.5)
+
+
+def _y_limits(panel: Panel) -> tuple[float, float]:
+    """Return the limits along y, logarithms where the axis is one."""
+    if panel.y_limits is not None:
+        low, high = panel.y_limits
+        return (float(np.log10(low)), float(np.log10(high))) if panel.log_y else (float(low), float(high))
+    values = np.concatenate([curve.y for curve in panel.curves])
+    values = values[np.isfinite(values) & ((values > 0) | (not panel.log_y))]
+    if values.size == 0:
+        return (-1.0, 1.0)
+    if panel.log_y:
+        values = np.log10(values)
+    low, high = float(values.min()), float(values.max())
+    room = 0.06 * (high - low) or 0.05 * abs(high) or 1.0
+    return low - room, high + room
+
+
+def _path(curve: Curve, place_x: Any, place_y: Any, most: int) -> str:
+    """Write a curve as steps from point to point; dots as lines without a length."""
+    dots = bool(STYLES[curve.style].marker)
+    kept = (thinned_dots if dots else thinned_line)(np.asarray(curve.y, np.float64), most)
+    x, y = (np.round(place(values[kept])) for place, values in ((place_x, curve.x), (place_y, curve.y)))
+    known = np.isfinite(y)
+    if dots:
+        points = np.stack([x[known], y[known]], axis=1).astype(int)
+        steps = np.diff(points, axis=0, prepend=np.zeros((1, 2), int))
+        return "".join(f"m{a} {b}h0" for a, b in steps.tolist())
+    pieces, at = [], np.zeros(2, int)
+    part = _parts(np.asarray(curve.x, np.float64))[kept]
+    cuts = np.flatnonzero(np.diff(part) | (np.diff(known.astype(int)) != 0)) + 1
+    for first, end in pairwise([0, *cuts.tolist(), known.size]):
+        if not known[first:end].any():
+            continue
+        points = np.stack([x[first:end], y[first:end]], axis=1).astype(int)
+        steps = np.diff(points, axis=0, prepend=at[None])
+        moved = " ".join(f"{a} {b}" for a, b in steps.tolist())
+        pieces.append(f"m{moved.replace(' -', '-')}" + ("h0" if end == first + 1 else ""))
+        at = points[-1]
+    return "".join(pieces)
+
+
+def _parts(x: FloatArray) -> NDArray[np.intp]:
+    """Return the number of the part of a curve that each point is in: between bands there is nothing to draw."""
+    step = np.diff(x)
+    beside = np.fmax(np.r_[-np.inf, step[:-1]], np.r_[step[1:], -np.inf])
+    return np.r_[0, np.cumsum((beside > 0) & (step > _GAP * beside))] if step.size > 1 else np.zeros(x.size, np.intp)
+
+
+def _area(ribbon: Ribbon, place_x: Any, place_y: Any) -> str:
+    x = np.r_[ribbon.x, ribbon.x[::-1]]
+    y = np.r_[ribbon.low, ribbon.high[::-1]]
+    points = np.stack([place_x(x), place_y(y)], axis=1)
+    return "M" + "L".join(f"{a:.0f} {b:.0f}" for a, b in points) + "Z"
+
+
+def style_rules(charts: Iterable[Chart]) -> str:
+    """Write the rules of style of all curves of charts: on a light page and on paper, then on a dark page."""
+    panels = [panel for chart in charts for panel in chart.figure.panels]
+    lines = dict.fromkeys(curve.style for panel in panels for curve in panel.curves)
+    areas = dict.fromkeys(area.style for panel in panels for area in panel.ribbons)
+    light = [_line_rule(name, STYLES[name]) for name in lines]
+    light += [f".r-{name}{{fill:{STYLES[name].colour};fill-opacity:.25}}" for name in areas]
+    dark = [f".s-{name}{{stroke:{_on_dark(STYLES[name].colour)}}}" for name in lines]
+    dark += [f".r-{name}{{fill:{_on_dark(STYLES[name].colour)}}}" for name in areas]
+    return "\n".join(light) + "\n@media screen and (prefers-color-scheme: dark){" + "".join(dark) + "}"
+
+
+def _line_rule(name: str, style: Style) -> str:
+    rule = f"fill:none;stroke:{style.colour};stroke-linejoin:round;"
+    if style.marker:
+        cap, width = ("round", _DOT) if style.marker == "." else ("square", _CROSS)
+        return f".s-{name}{{{rule}stroke-width:{width:g};stroke-linecap:{cap}}}"
+    pattern = _DASHES[style.dashes] if isinstance(style.dashes, str) else style.dashes[1]
+    dashes = " ".join(f"{max(style.width, 1) * part:.3g}" for part in pattern)
+    rest = f";stroke-dasharray:{dashes}" if dashes else ";stroke-linecap:round"
+    return f".s-{name}{{{rule}stroke-width:{style.width:g}{rest}}}"
+
+
+def _on_dark(colour: str) -> str:
+    """Return a colour that is as far from black as it was from white."""
+    red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    hue, light, much = colorsys.rgb_to_hls(red, green, blue)
+    least, most = _DARK
+    found = colorsys.hls_to_rgb(hue, least + (most - least) * (1 - light), much)
+    return "#" + "".join(f"{round(255 * part):02x}" for part in found)
+
+
+#: Dots of a column that are kept: its extremes, and some between.
+_DOTS = 5
+
+
+def thinned_line(y: FloatArray, most: int) -> NDArray[np.intp]:
+    """Choose points of a curve: of each of `most` / 2 columns of neighbouring points the lowest and the highest.
+
+    Parameters
+    ----------
+    y : ndarray, shape (n,)
+        Values in the order of x; NaN makes a gap, which stays where it is a column wide.
+    most : int
+        Points at most.
+
+    Returns
+    -------
+    ndarray of int
+        Increasing.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from jointfrf.workbench.report.chart import thinned_line
+    >>> thinned_line(np.array([0.0, 5.0, 1.0, 2.0, -7.0, 3.0, 4.0, 0.0]), 4).tolist()
+    [0, 1, 4, 6]
+    """
+    if y.size <= most:
+        return np.arange(y.size)
+    starts = _columns(y.size, max(most // 2, 1))
+    finite = np.isfinite(y)
+    lowest = _first_where(y, np.minimum.reduceat(np.where(finite, y, np.inf), starts), starts)
+    highest = _first_where(y, np.maximum.reduceat(np.where(finite, y, -np.inf), starts), starts)
+    return np.unique(np.concatenate([lowest, highest]))
+
+
+def thinned_dots(y: FloatArray, most: int) -> NDArray[np.intp]:
+    """Choose dots: of each column of neighbours the lowest, the highest, and others evenly spread; as `thinned_line`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from jointfrf.workbench.report.chart import thinned_dots
+    >>> y = np.sin(np.arange(1000.0) ** 2)
+    >>> kept = thinned_dots(y, 100)
+    >>> bool(kept.size <= 100), bool(y[kept].max() == y.max())
+    (True, True)
+    """
+    if y.size <= most:
+        return np.arange(y.size)
+    columns = max(most // _DOTS, 1)
+    evenly = np.linspace(0, y.size - 1, (_DOTS - 2) * columns).astype(np.intp)
+    return np.unique(np.concatenate([thinned_line(y, 2 * columns), evenly]))
+
+
+def _columns(size: int, count: int) -> NDArray[np.intp]:
+    return np.linspace(0, size, count, endpoint=False).astype(np.intp)
+
+
+def _first_where(y: FloatArray, value: FloatArray, starts: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the first place in each column that holds its value; its first place where it holds none."""
+    column = np.repeat(np.arange(starts.size), np.diff(np.append(starts, y.size)))
+    hit = np.flatnonzero(y == value[column])
+    found = starts.copy()
+    own, first = np.unique(column[hit], return_index=True)
+    found[own] = hit[first]
+    return found

@@ -1,0 +1,387 @@
+"""One self-contained HTML page of sections and their parts; for screens of any width, light or dark, and for paper."""
+
+from __future__ import annotations
+
+import re
+from base64 import b64encode
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+
+from jointfrf.dofs import Parameter
+from jointfrf.extras import check_extras
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.messages.finding import Finding, worst_first
+from jointfrf.spelling import visible
+from jointfrf.workbench.report.chart import Chart, chart_view, style_rules
+from jointfrf.workbench.report.draw import Drawing
+from jointfrf.workbench.report.figure import Figure
+from jointfrf.workbench.report.table import VERDICT, Table, shown, turned, without_repeats, written
+
+__all__ = [
+    "Document",
+    "HeatMap",
+    "Listing",
+    "Page",
+    "Part",
+    "Picture",
+    "Section",
+    "Sketch",
+    "Words",
+    "make_document",
+    "section_of_command",
+    "words_of_findings",
+]
+
+#: Up to so many columns fit on any screen; more than so many are written smaller; more than so many become rows.
+_NARROW, _WIDE, _WIDEST = 4, 9, 12
+#: Where templates and styles are.
+_FOLDER = Path(__file__).parent
+#: A map with more columns is written smaller.
+_DENSE = 8
+
+
+@dataclass(frozen=True)
+class Words:
+    """Sentences: paragraphs, or with `kind` a list of notes, warnings or findings.
+
+    `folded` has for each sentence the texts that are shown when the reader asks for them, and on paper.
+    """
+
+    sentences: Sequence[str]
+    kind: str = ""
+    folded: Sequence[Sequence[str]] = ()
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure as it is drawn: its SVG file becomes part of the page."""
+
+    figure: Figure
+    drawing: Drawing
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """A drawing of our own: SVG whose colours follow the page, its caption, and the same in words."""
+
+    key: str
+    svg: str
+    caption: str
+    alt: str
+
+
+@dataclass(frozen=True)
+class HeatMap:
+    """Numbers by row and column, shaded from `light` (no shade) to `dark`; NaN is left empty.
+
+    With `log` the shade goes with the logarithm, up to the largest value if that is above `dark`.
+    """
+
+    key: str
+    title: str
+    corner: str
+    rows: Sequence[str]
+    columns: Sequence[str]
+    values: FloatArray
+    light: float
+    dark: float
+    note: str = ""
+    digits: int = 2
+    log: bool = False
+
+    @property
+    def darkest(self) -> float:
+        """The value of the darkest shade."""
+        finite = self.values[np.isfinite(self.values)]
+        return max(self.dark, float(finite.max())) if self.log and finite.size else self.dark
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A text shown as it is written when the reader asks for it; with `printed` on paper, too."""
+
+    name: str
+    text: str
+    printed: bool = False
+
+
+Part = Table | Words | Picture | Chart | Sketch | HeatMap | Listing
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and what follows it; `more` are parts shown when the reader asks for them, under a name."""
+
+    key: str
+    heading: str
+    parts: Sequence[Part]
+    more: tuple[str, Sequence[Part]] = ("", ())
+
+
+@dataclass(frozen=True)
+class Document:
+    """What a page holds; tables without rows and sections without parts are left out."""
+
+    title: str
+    about: str
+    sections: Sequence[Section] = field(default_factory=tuple)
+
+    def __post_init__(self) -> None:
+        kept = [replace(one, parts=[part for part in one.parts if not _is_empty(part)]) for one in self.sections]
+        object.__setattr__(self, "sections", [one for one in kept if one.parts])
+
+
+def _is_empty(part: Part) -> bool:
+    return isinstance(part, Table) and not part.rows
+
+
+def section_of_command(command: str) -> Section:
+    """Return the section that says how a page was made."""
+    return Section("made", "How this was made", [Listing("", command)] if command else [])
+
+
+#: Characters of a finding that stand in one line of a page.
+_ONE_LINE = 84
+
+
+def words_of_findings(findings: Sequence[Finding]) -> list[Words]:
+    """Return warnings and notes as lists, the worst first: a line for each code; all of a long text is folded below it.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> from jointfrf.workbench.report.document import words_of_findings
+    >>> (words,) = words_of_findings([jf.Finding("equal-points", about=(a, "b")) for a in "cd"])
+    >>> words.sentences
+    ['c, b are equal joints, which share their parameters (and 1 more) [equal-points]']
+    >>> words.folded
+    [['c, b are equal joints, which share their parameters.', 'd, b are equal joints, which share their parameters.']]
+    """
+    words = []
+    for severities, style in ((("error", "warning"), "warnings"), (("note",), "notes")):
+        groups: dict[str, list[str]] = {}
+        for one in worst_first(findings):
+            if one.severity in severities:
+                groups.setdefault(one.code, []).append(one.text)
+        heads = [_head(texts) for texts in groups.values()]
+        folded = [
+            [f"{text}." for text in texts] if head.rstrip(".") != texts[0] else []
+            for head, texts in zip(heads, groups.values(), strict=True)
+        ]
+        if heads:
+            coded = [f"{head} [{code}]" for head, code in zip(heads, groups, strict=True)]
+            words.append(Words(coded, style, folded))
+    return words
+
+
+def _head(texts: Sequence[str]) -> str:
+    """Return the line of a group of findings: the first, as far as it goes in a line."""
+    first, more = texts[0], f" (and {len(texts) - 1} more)" if len(texts) > 1 else ""
+    if len(first) > _ONE_LINE:
+        ends = [match.start() for match in re.finditer(r"[;,:(](?= )|(?<= )[(]| (?=%|and|which|because)", first)]
+        cut = max((end for end in ends if _ONE_LINE // 3 < end <= _ONE_LINE), default=first.rfind(" ", 0, _ONE_LINE))
+        first = first[: cut if cut > 0 else _ONE_LINE].rstrip(" ;,:(") + " …"
+    return first + (more or ("" if first.endswith("…") else "."))
+
+
+def make_document(document: Document) -> str:
+    """Write a page.
+
+    Parameters
+    ----------
+    document : Document
+
+    Returns
+    -------
+    str
+        HTML without any link to another file.
+
+    Raises
+    ------
+    MissingPackageError
+        jinja2 is missing.
+    """
+    check_extras("jinja2")
+    import jinja2
+    from markupsafe import Markup
+
+    parts = [part for section in document.sections for part in (*section.parts, *section.more[1])]
+    charts = [part for part in parts if isinstance(part, Chart)]
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(_FOLDER), autoescape=True, undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True, finalize=_seen,
+    )  # fmt: skip
+    script = (_FOLDER / "chart.js").read_text(encoding="utf-8") if charts else ""
+    script = script.replace("\r\n", "\n").replace("\r", "\n")  # as a browser reads it, whose checksum must be the same
+    return environment.get_template("page.html.jinja").render(
+        document=document,
+        policy=_policy(script),
+        version=version("jointfrf"),
+        verdict=VERDICT,
+        style=Markup(_style(parts, charts)),
+        script=Markup(script),
+        sections=[
+            {
+                "key": section.key,
+                "heading": section.heading,
+                "parts": [_view(part) for part in section.parts],
+                "more": section.more[0],
+                "hidden": [_view(part) for part in section.more[1]],
+            }
+            for section in document.sections
+        ],
+    )
+
+
+def _policy(script: str) -> str:
+    """Return what a browser lets the page do: show itself and run this script; nothing is loaded, nothing is sent."""
+    checksum = b64encode(sha256(script.encode("utf-8")).digest()).decode("ascii")
+    allowed = f"'sha256-{checksum}'" if script else "'none'"
+    return (
+        f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
+        "form-action 'none'"
+    )
+
+
+def _seen(value: Any) -> Any:
+    """Return what is shown: texts with the characters escaped that are not seen; markup of our own as it is."""
+    return visible(value, "\n\t") if type(value) is str else value
+
+
+def _style(parts: Sequence[Part], charts: Sequence[Chart]) -> str:
+    """Return the rules of style of a page: those of all pages, and those of the parts it has."""
+    kinds = {"chart": Chart, "map": HeatMap, "sketch": Sketch}
+    names = ["page", *(name for name, kind in kinds.items() if any(isinstance(part, kind) for part in parts))]
+    rules = [(_FOLDER / f"{name}.css").read_text(encoding="utf-8") for name in names]
+    return "".join(rules) + (style_rules(charts) if charts else "")
+
+
+def _view(part: Part) -> dict[str, Any]:
+    """Return what the template shows of a part; `kind` names its macro."""
+    if isinstance(part, Table):
+        return {"kind": "table", **_table_view(part)}
+    if isinstance(part, Picture):
+        return {"kind": "picture", "figure": part.figure, "image": _as_address(part.drawing.svg)}
+    if isinstance(part, Chart):
+        return {"kind": "chart", **chart_view(part)}
+    if isinstance(part, HeatMap):
+        return {"kind": "map", **_map_view(part)}
+    if isinstance(part, Sketch):
+        from markupsafe import Markup
+
+        return {"kind": "sketch", "sketch": part, "svg": Markup(part.svg)}
+    return {"kind": "words" if isinstance(part, Words) else "listing", "part": part}
+
+
+def _as_address(svg: bytes) -> str:
+    """Return a drawing as the address of an image, in a quarter less than base64 takes."""
+    text = re.sub("<[^<>]*>", lambda tag: tag[0].replace("'", "").replace('"', "'"), svg.decode())
+    return "data:image/svg+xml," + quote(" ".join(text.split()), safe=" !$&'()*+,-./:;=?@_~|")
+
+
+def _map_view(part: HeatMap) -> dict[str, Any]:
+    """Return the cells of a map: text, and its shade from 0 to 100."""
+    known = np.where(np.isfinite(part.values), part.values, part.light)
+    light, dark = part.light, part.darkest
+    if part.log:
+        known, light, dark = np.log(np.maximum(known, light)), np.log(light), np.log(dark)
+    shades = 100 * np.clip((known - light) / (dark - light), 0, 1)
+    rows = [
+        (name, [(_map_text(v, part.digits), f"{s:.0f}") for v, s in zip(own, shade, strict=True)])
+        for name, own, shade in zip(part.rows, part.values.tolist(), shades.tolist(), strict=True)
+    ]
+    ends = [f"{value:.3g}" for value in (part.light, part.darkest)]
+    return {"map": part, "rows": rows, "dense": len(part.columns) > _DENSE, "ends": ends}
+
+
+def _map_text(value: float, digits: int) -> str:
+    """Write a cell of a map: of large values as many decimals less as they have digits more."""
+    if np.isnan(value):
+        return ""
+    return f"{value:.{max(digits - (int(np.log10(abs(value))) if abs(value) >= 1 else 0), 0)}f}"
+
+
+def _table_view(table: Table) -> dict[str, Any]:
+    table = without_repeats(shown(table))
+    if len(table.columns) > _WIDEST and len(table.rows) < _WIDEST:
+        table = turned(table)
+    cells = [
+        [_marked(cell) if isinstance(cell, Parameter) else text for cell, text in zip(row, texts, strict=True)]
+        for row, texts in zip(table.rows, written(table), strict=True)
+    ]
+    return {"table": table, "numeric": table.is_number, "rows": cells, "shape": _shape(table)}
+
+
+def _shape(table: Table) -> str:
+    """Return the class of style of a table."""
+    count = len(table.columns)
+    return "narrow" if count <= _NARROW else "usual" if count <= _WIDE else "wide"
+
+
+def _marked(parameter: Parameter) -> str:
+    """Write a parameter with its index and Greek letter."""
+    from markupsafe import Markup
+
+    index = ",".join(dict.fromkeys((parameter.row, parameter.column))).replace("theta_", "θ").replace("theta", "θ")
+    return Markup("<i>{}</i><sub>{}</sub>").format(parameter.kind, index)
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a page holds.
+
+    Attributes
+    ----------
+    title : str
+    about : str
+        A sentence or two below it: what was computed from what.
+    summary : sequence of Table
+        Short tables.
+    tables : sequence of Table
+    figures : sequence of (Figure, Drawing)
+        Figures as they are drawn: the SVG files become part of the page.
+    subject : str
+        Heading of the texts that follow.
+    text : str
+        Shown as it is written; left out if empty.
+    sources : sequence of (name, text)
+        Shown when the reader asks for them.
+    verdict : str
+        The sentence that the page begins with.
+    headline : str
+        Key of the figure that follows it, before all tables.
+    """
+
+    title: str
+    about: str
+    summary: Sequence[Table]
+    tables: Sequence[Table]
+    figures: Sequence[tuple[Figure, Drawing]]
+    subject: str = ""
+    text: str = ""
+    sources: Sequence[tuple[str, str]] = ()
+    verdict: str = ""
+    headline: str = ""
+
+    @property
+    def document(self) -> Document:
+        """The page as sections and their parts."""
+        pictures = [Picture(figure, drawing) for figure, drawing in self.figures]
+        first = [one for one in pictures if one.figure.key == self.headline]
+        said = [Words([self.verdict], "findings")] if self.verdict else []
+        sections = [
+            Section("summary", "Summary", [*said, *first, *self.summary]),
+            Section("tables", "Tables", self.tables),
+            Section("figures", "Figures", [one for one in pictures if one not in first]),
+        ]
+        if self.subject:
+            texts = ([Listing("", self.text)] if self.text else []) + [Listing(*own) for own in self.sources]
+            sections.append(Section("subject", self.subject, texts))
+        return Document(self.title, self.about, sections)

@@ -1,0 +1,225 @@
+"""Figures as data: what each shows, before anything draws it."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.frf.bands import Band
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.workbench.report.table import csv_cell
+
+__all__ = [
+    "Curve",
+    "Figure",
+    "Interval",
+    "Level",
+    "MovingBody",
+    "NamedBands",
+    "Panel",
+    "Ribbon",
+    "Surface",
+    "deformed_surface",
+    "figure_csv",
+]
+
+#: Names of bands and their limits, Hz.
+NamedBands = tuple[tuple[str, tuple[Band, ...]], ...]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A line: y over x, drawn in one of `draw.STYLES`; `thin` where it is not to hide others."""
+
+    label: str
+    x: FloatArray
+    y: FloatArray
+    style: str
+    thin: bool = False
+
+
+@dataclass(frozen=True)
+class Ribbon:
+    """The area between two curves."""
+
+    label: str
+    x: FloatArray
+    low: FloatArray
+    high: FloatArray
+    style: str
+
+
+@dataclass(frozen=True)
+class Level:
+    """A value: a horizontal line, over `bands` only if they are given."""
+
+    label: str
+    value: float
+    style: str
+    bands: tuple[Band, ...] = ()
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A median with its 2.5 and 97.5 percentiles, and a published value beside it."""
+
+    label: str
+    low: float
+    median: float
+    high: float
+    published: float | None = None
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Quadrilaterals shaded by a value: in space, shape (n, 4, 3), seen from one side; or in a plane, (n, 4, 2).
+
+    `edges` are other quadrilaterals of which only the outline is drawn.
+    """
+
+    faces: FloatArray
+    values: FloatArray
+    label: str = ""
+    edges: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Axes of a figure.
+
+    Labels are "quantity, unit". An empty `x_label` leaves out the numbers, too: the panel below shares them.
+    `shades` are (label, bands) in Hz; `strips` are bands drawn as bars at the bottom. `y_step` is the distance of the
+    numbers along y, where it is not to be chosen; `height` is relative to that of other panels; `interval_names` are
+    what the middle and the limits of intervals are. A panel that holds nothing is left blank.
+    """
+
+    title: str
+    x_label: str
+    y_label: str
+    curves: tuple[Curve, ...] = ()
+    ribbons: tuple[Ribbon, ...] = ()
+    levels: tuple[Level, ...] = ()
+    intervals: tuple[Interval, ...] = ()
+    shades: NamedBands = ()
+    strips: NamedBands = ()
+    log_y: bool = False
+    log_x: bool = False
+    x_limits: tuple[float, float] | None = None
+    y_limits: tuple[float, float] | None = None
+    surface: Surface | None = None
+    y_step: float | None = None
+    height: float = 1.0
+    interval_names: tuple[str, str] = ("median", "2.5 to 97.5 %")
+
+    @property
+    def is_blank(self) -> bool:
+        """Whether it holds nothing."""
+        return not (self.curves or self.ribbons or self.levels or self.intervals or self.surface)
+
+
+@dataclass(frozen=True)
+class Figure:
+    """Panels in rows of `columns`.
+
+    Attributes
+    ----------
+    key : str
+        Name of its files.
+    caption : str
+        Its caption on a page.
+    panels : tuple of Panel
+    columns : int
+    number : str
+        Its number in the source, or empty.
+    heading : str
+        Title above the panels, where the figure is a file of its own.
+    """
+
+    key: str
+    caption: str
+    panels: tuple[Panel, ...] = ()
+    columns: int = 1
+    number: str = ""
+    heading: str = ""
+
+
+def figure_csv(figure: Figure) -> str:
+    """Write the data of a figure as CSV, a line for each point: panel, curve, x, y and the upper limit of an area."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["panel", "curve", "x", "y", "y_high"])
+    for number, panel in enumerate(figure.panels, 1):
+        writer.writerows(map(csv_cell, (panel.title or str(number), *row)) for row in _panel_rows(panel))
+    return text.getvalue()
+
+
+def _panel_rows(panel: Panel) -> Iterator[tuple[object, ...]]:
+    """Rows of a panel: curve, x, y and the upper limit of an area."""
+    for curve in panel.curves:
+        yield from ((curve.label, x, y, "") for x, y in zip(curve.x.tolist(), curve.y.tolist(), strict=True))
+    for area in panel.ribbons:
+        columns = (area.x.tolist(), area.low.tolist(), area.high.tolist())
+        yield from ((area.label, *point) for point in zip(*columns, strict=True))
+    yield from ((level.label, "", level.value, "") for level in panel.levels)
+    for interval in panel.intervals:
+        label = interval.label.replace("\n", ", ")
+        middle, limits = panel.interval_names
+        yield f"{label}: {middle}", "", interval.median, ""
+        yield f"{label}: {limits}", "", interval.low, interval.high
+        if interval.published is not None:
+            yield f"{label}: thesis", "", interval.published, ""
+    if panel.surface is not None:
+        middles = panel.surface.faces.mean(axis=1)
+        for middle, value in zip(middles.tolist(), panel.surface.values.tolist(), strict=True):
+            yield panel.surface.label, " ".join(f"{x:.9g}" for x in middle), value, ""
+    for label, bands in (*panel.shades, *panel.strips):
+        yield from ((label, f"{low:g}-{high:g}", "", "") for low, high in bands)
+
+
+#: Largest displacement drawn, as a share of the length of the structure.
+_DEFLECTION = 0.12
+
+
+@dataclass(frozen=True)
+class MovingBody:
+    """The outside of a body and how its nodes move.
+
+    Attributes
+    ----------
+    nodes : ndarray, shape (n_nodes, 3)
+        Positions, m.
+    faces : ndarray of int, shape (n_faces, 4)
+        Nodes of the quadrilaterals on the outside, counted from 0.
+    motion : ndarray, shape (n_nodes, 3)
+        Displacements, of any size.
+    """
+
+    nodes: FloatArray
+    faces: NDArray[np.integer]
+    motion: FloatArray
+
+
+def deformed_surface(bodies: Sequence[MovingBody]) -> Surface:
+    """Draw bodies in a common motion: deformed true to scale, darker where they move more, outlines at rest.
+
+    Parameters
+    ----------
+    bodies : sequence of MovingBody
+
+    Returns
+    -------
+    Surface
+        Values are displacements, as shares of the largest.
+    """
+    reach = _DEFLECTION * np.ptp(np.concatenate([body.nodes for body in bodies]), axis=0).max()
+    sizes = [np.linalg.norm(body.motion, axis=1) for body in bodies]
+    largest = max(float(size.max()) for size in sizes)
+    drawn = [(body.nodes + reach / largest * body.motion)[body.faces] for body in bodies]
+    values = [(size / largest)[body.faces].mean(axis=1) for body, size in zip(bodies, sizes, strict=True)]
+    at_rest = [body.nodes[body.faces] for body in bodies]
+    return Surface(np.concatenate(drawn), np.concatenate(values), edges=np.concatenate(at_rest))

@@ -1,0 +1,340 @@
+"""Figures of one identification: the joint over frequency, which frequencies determine it; their files."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple, cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from jointfrf.dofs import Parameter, ParameterKind, compliance_unit, parameter_name
+from jointfrf.errors import IllConditionedWarning
+from jointfrf.files import OwnFolder, clean_name
+from jointfrf.identification.fit_data import FitData
+from jointfrf.identification.record import fit_to_dict
+from jointfrf.identification.result import Fit, FittedParameter
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_type
+from jointfrf.kernel.linear_algebra import invert
+from jointfrf.laws.law_joint import LawJoint
+from jointfrf.workbench.report.axes import FREQUENCY, bulk_limits
+from jointfrf.workbench.report.draw import draw, laid_out
+from jointfrf.workbench.report.figure import Curve, Figure, Panel, Ribbon
+from jointfrf.workbench.report.fit_frfs import compare_frfs, compare_model, frf_figures
+from jointfrf.workbench.report.table import Cell, Table
+
+__all__ = ["fit_figures", "fit_overview", "information_figure", "information_table", "plot", "shown_name", "write_fit"]
+
+
+def fit_figures(fit: Fit) -> list[Figure]:
+    """Figures of the identified joint: K* and compliance of each DOF, line by line and as fitted.
+
+    Parameters
+    ----------
+    fit : Fit
+        What `identify` found.
+
+    Returns
+    -------
+    list of Figure
+        ``"joint_<dof>"`` for each DOF that is not rigid.
+    """
+    up = np.argsort(fit.freq_hz, kind="stable")
+    freq, n = fit.freq_hz[up], len(fit.dofs)
+    lines = np.full((freq.size, n, n), np.nan + 0j) if fit.k_lines is None else fit.k_lines[up]
+    fitted = _stiffness_found(fit, freq)
+    with warnings.catch_warnings():
+        # Displacements and rotations differ by orders of magnitude.
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        compliance = (
+            invert(fitted, on_singular="nan") if fit.laws is None else fit.laws.compliance(freq, on_singular="nan")
+        )
+        each_compliance = fit.data.line_compliance()[up] if isinstance(fit.data, FitData) else _inverted(lines)
+    used = fit.data.fitted[up] if isinstance(fit.data, FitData) else np.ones(lines.shape[:2], np.bool_)
+    figures = []
+    for d, dof in enumerate(fit.dofs):
+        if fit.laws is not None and dof in fit.laws.rigid:
+            continue
+        stiffness = Parameter.of_dof("k", dof)
+        panels = []
+        for label, each, curve, ribbons in (
+            (f"K*, {stiffness.unit}", lines[:, d, d], fitted, _intervals(fit, stiffness, freq)),
+            (f"C, {compliance_unit(dof, dof)}", each_compliance[:, d], compliance, ((), ())),
+        ):
+            own = _EntryLines(fit.method, label, freq, each, curve[:, d, d], used[:, d], ribbons)
+            panels += _panels(own if label.startswith("C") else _as_open(own, fit, stiffness))
+        words = f"Joint DOF {dof}: complex stiffness K* and compliance C"
+        figures.append(Figure(f"joint_{dof}", words, tuple(panels), 2, heading=words))
+    return figures
+
+
+def _inverted(k_lines: ComplexArray) -> ComplexArray:
+    """Return the diagonal of the compliance of each line, shape (n_freq, n)."""
+    if not np.isfinite(k_lines).any():
+        return np.asarray(np.einsum("ldd->ld", k_lines))
+    inverse = invert(np.where(np.isfinite(k_lines), k_lines, 0), on_singular="nan")
+    return np.asarray(np.einsum("ldd->ld", inverse))
+
+
+class _EntryLines(NamedTuple):
+    """One entry of K* or C: values of each line by itself, as fitted, which lines were used, intervals or bound.
+
+    `intervals` are those of the real and of the imaginary part.
+    """
+
+    method: str
+    label: str
+    freq_hz: FloatArray
+    each: ComplexArray
+    fitted: ComplexArray
+    used: NDArray[np.bool_]
+    intervals: tuple[tuple[Ribbon, ...], tuple[Ribbon, ...]] = ((), ())
+    bound: float | None = None
+
+
+def _stiffness_found(fit: Fit, freq_hz: FloatArray) -> ComplexArray:
+    """Return K*(w) of the joint found, shape (n_freq, n, n); NaN at rigid DOFs."""
+    if fit.laws is None or not fit.laws.rigid:
+        return fit.k_joint(freq_hz)
+    k = np.full((freq_hz.size, len(fit.dofs), len(fit.dofs)), np.nan + 0j)
+    at = [d for d, dof in enumerate(fit.dofs) if dof not in fit.laws.rigid]
+    if at:
+        moving = LawJoint(fit.laws.laws, (), None, [fit.dofs[d] for d in at])
+        k[:, np.array(at)[:, None], at] = moving.dynamic_stiffness(freq_hz)
+    return k
+
+
+def _of_law(fit: Fit, dof: str, freq_hz: FloatArray) -> tuple[tuple[Ribbon, ...], tuple[Ribbon, ...]]:
+    """Confidence intervals of Re K* and Im K* of a law at each frequency, from the covariance of its parameters."""
+    assert fit.laws is not None
+    law, names = fit.laws.laws[dof, dof], [one.name for one in fit.parameters]
+    fields = enumerate(parameter_name(field.name, dof, dof) for field in law.fields)
+    own = [(i, names.index(name)) for i, name in fields if name in names]
+    if not own:
+        return (), ()
+    omega, at, ribbons = 2 * np.pi * freq_hz, [place for _, place in own], []
+    slopes, middle = law.slopes(omega)[[i for i, _ in own]], law.stiffness(omega)
+    for part, own_slopes, own_middle in (("Re", slopes.real, middle.real), ("Im", slopes.imag, middle.imag)):
+        variance = np.einsum("pf,pq,qf->f", own_slopes, fit.covariance[np.ix_(at, at)], own_slopes)
+        reach = float(ndtri(0.975)) * np.sqrt(np.maximum(variance, 0))
+        ribbons.append(Ribbon(f"95 % interval of {part} K*", freq_hz, own_middle - reach, own_middle + reach, "low"))
+    return (ribbons[0],), (ribbons[1],)
+
+
+def _intervals(fit: Fit, stiffness: Parameter, freq_hz: FloatArray) -> tuple[tuple[Ribbon, ...], tuple[Ribbon, ...]]:
+    """Confidence intervals of a stiffness, and of the damping of its DOF if that is one term; none that are open."""
+    dof = stiffness.row
+    if fit.laws is not None:
+        return _of_law(fit, dof, freq_hz)
+    found, ends = fit.confidence_interval(0.95), np.array([freq_hz.min(), freq_hz.max()])
+
+    def ribbon(name: str, label: str, factor: FloatArray) -> tuple[Ribbon, ...]:
+        low, high = found[name]
+        if not (np.isfinite(low) and np.isfinite(high)):
+            return ()
+        return (Ribbon(f"95 % interval of {label}", ends, low * factor, high * factor, "low"),)
+
+    damping = [
+        (name, factor)
+        for name, factor in (
+            (parameter_name("h", dof, dof), np.ones(2)),
+            (parameter_name("c", dof, dof), 2 * np.pi * ends),
+        )
+        if name in found and fit.value[name] != 0
+    ]
+    of_damping = ribbon(damping[0][0], "damping", damping[0][1]) if len(damping) == 1 else ()
+    return ribbon(stiffness.name, "k", np.ones(2)), of_damping
+
+
+def _as_open(lines: _EntryLines, fit: Fit, stiffness: Parameter) -> _EntryLines:
+    """Put the lower bound in place of a stiffness that cannot be distinguished from a rigid one."""
+    if fit.laws is not None:
+        return lines
+    low, high = fit.confidence_interval(0.95)[stiffness.name]
+    return lines if np.isfinite(high) else lines._replace(bound=max(low, 0.0))
+
+
+def _panels(lines: _EntryLines) -> list[Panel]:
+    """Real and imaginary part of one entry; the bound belongs to the real part."""
+    panels = []
+    used, out = lines.used, ~lines.used
+    for part, values, curve, ribbons in (
+        ("Re", lines.each.real, lines.fitted.real, lines.intervals[0]),
+        ("Im", lines.each.imag, lines.fitted.imag, lines.intervals[1]),
+    ):
+        is_known = np.isfinite(lines.each[used]).any()
+        curves = [Curve("each line", lines.freq_hz[used], values[used], "dots")] if is_known else []
+        shown: list[float] = []
+        if lines.bound is None:
+            curves.append(Curve(f"fit ({lines.method})", lines.freq_hz, curve, "actual"))
+            shown = [float(curve.min()), float(curve.max())] if np.isfinite(curve).all() else []
+        elif part == "Re" and lines.bound > 0:
+            ends = lines.freq_hz[[0, -1]]
+            curves.append(Curve("lower bound of k, 95 %", ends, np.full(2, lines.bound), "high"))
+            shown = [lines.bound]
+        if out.any():
+            curves.append(Curve("lines left out", lines.freq_hz[out], values[out], "outlying"))
+        if ribbons and not is_known:
+            # Without lines by themselves the axis fits the interval.
+            shown += [float(end) for one in ribbons for end in (one.low.min(), one.high.max())]
+            limits = bulk_limits([], shown, least_room=0.0)
+        else:
+            limits = bulk_limits([values], shown)
+        panels.append(Panel("", FREQUENCY, f"{part} {lines.label}", tuple(curves), ribbons, y_limits=limits))
+    return panels
+
+
+def write_fit(fits: Sequence[Fit], folder: Path, source: str, figures: Sequence[Figure] = ()) -> list[Path]:
+    """Write ``identification.json`` and a PNG and an SVG file a DOF for each fit; nothing is left half-written.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+        Results on the same data; the figures of the second and later ones carry their method in the name.
+    folder : Path
+        Made if it is missing.
+    source : str
+        Name of the file that was measured, written into the JSON.
+    figures : sequence of Figure
+        Drawn beside those of the fits.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+
+    Raises
+    ------
+    MissingPackageError
+        matplotlib is missing.
+    OSError
+        The files cannot be written.
+    """
+    text = json.dumps({"source": source, "fits": [fit_to_dict(fit, lines=False) for fit in fits]}, indent=2)
+    contents: dict[str, str | bytes] = {"identification.json": text + "\n"}
+    for i, fit in enumerate(fits):
+        for figure in fit_figures(fit):
+            stem = figure.key if i == 0 else f"{figure.key}_{fit.method}"
+            contents[f"{stem}.png"], contents[f"{stem}.svg"] = draw(figure)
+    for figure in figures:
+        contents[f"{figure.key}.png"], contents[f"{figure.key}.svg"] = draw(figure)
+    own = OwnFolder(folder).make()
+    return [own.write(clean_name(name), content) for name, content in contents.items()]
+
+
+#: Parts of the band over which shares are summed, and lines a part at least.
+_PARTS, _LEAST = 48, 4
+#: Shares of the information below the frequencies in the table.
+_QUANTILES = (0.1, 0.5, 0.9)
+#: Styles and names of parameters of springs, by their kinds.
+_STYLES = {"k": "ismm", "h": "stiffness", "c": "high"}
+_LABELS = {"k": "stiffness k", "h": "hysteretic damping h", "c": "viscous damping c"}
+#: Styles of other parameters of laws, in their order.
+_OTHERS = ("stiffness", "high", "actual")
+
+
+def shown_name(one: FittedParameter) -> Cell:
+    """Return a parameter as a cell of a table."""
+    is_spring = one.origin == "joint" and one.kind in get_args(ParameterKind)
+    return Parameter(cast(ParameterKind, one.kind), one.row, one.column) if is_spring else one.name
+
+
+def information_table(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Table:
+    """Return for each parameter below which frequency a tenth, half and nine tenths of the information lie.
+
+    Parameters
+    ----------
+    fit : Fit
+    freq_hz : ndarray, shape (n_freq,)
+        Rising, Hz.
+    shares : ndarray, shape (n_freq, p)
+        Share of each line.
+    """
+    total = np.cumsum(shares, axis=0)
+    rows: list[tuple[Cell, ...]] = []
+    for i, term in enumerate(fit.parameters):
+        at = [min(int(np.searchsorted(total[:, i], q * total[-1, i])), freq_hz.size - 1) for q in _QUANTILES]
+        rows.append((shown_name(term), *(float(freq_hz[a]) for a in at)))
+    columns = ("parameter", *(f"{100 * q:.0f} % below, Hz" for q in _QUANTILES))
+    note = "Eight tenths of what the data say of a parameter lie between the first and the last frequency."
+    return Table("information-table", "Where the information lies", columns, tuple(rows), note=note)
+
+
+def information_figure(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Figure | None:
+    """Draw the share of each part of the band in what is known of the parameters of each DOF; None for few lines."""
+    parts = min(_PARTS, freq_hz.size // _LEAST)
+    if parts < 3 or freq_hz[-1] == freq_hz[0]:
+        return None
+    edges = np.linspace(freq_hz[0], freq_hz[-1], parts + 1)
+    at = np.clip(np.searchsorted(edges, freq_hz, side="right") - 1, 0, parts - 1)
+    panels = []
+    for dof in fit.dofs:
+        terms = [(i, term) for i, term in enumerate(fit.parameters) if term.row == term.column == dof]
+        if not terms:
+            continue
+        others = [term.kind for _, term in terms if term.kind not in _STYLES]
+        curves = tuple(
+            _steps(edges, np.bincount(at, shares[:, i], parts).astype(np.float64), term, others) for i, term in terms
+        )
+        panels.append(Panel(f"DOF {dof}", FREQUENCY, f"share of the band in {parts} parts, %", curves))
+    caption = "Information density: how much each part of the band says about each parameter"
+    return Figure("information", caption, tuple(panels), 2 if len(panels) > 1 else 1)
+
+
+def _steps(edges: FloatArray, share: FloatArray, term: FittedParameter, others: list[str]) -> Curve:
+    """Draw shares as steps; `others` are the kinds of this DOF that springs and dampers do not have."""
+    style = _STYLES.get(term.kind) or _OTHERS[others.index(term.kind) % len(_OTHERS)]
+    return Curve(_LABELS.get(term.kind, term.kind), np.repeat(edges, 2)[1:-1], np.repeat(100 * share, 2), style)
+
+
+#: FRFs that are drawn, two beside each other.
+_FRFS = 4
+
+
+def fit_overview(fit: Fit) -> Figure:
+    """Return K* and compliance of each DOF, and the first FRFs where the fit holds them, as one figure."""
+    panels: list[Panel] = []
+    for figure in fit_figures(fit):
+        dof = figure.key.removeprefix("joint_")
+        titles = (f"DOF {dof}: joint stiffness", "", f"DOF {dof}: joint compliance", "")
+        panels += [replace(panel, title=title) for panel, title in zip(figure.panels, titles, strict=True)]
+    if fit.data is not None:
+        up = np.argsort(fit.freq_hz, kind="stable")
+        compared = compare_frfs(fit.data, fit.dofs) if isinstance(fit.data, FitData) else compare_model(fit)
+        frfs = frf_figures(compared, fit.freq_hz, up)[:_FRFS]
+        for first in range(0, len(frfs), 2):
+            beside = frfs[first : first + 2]
+            for part in zip(*(figure.panels for figure in beside), strict=True):
+                own = [
+                    replace(panel, title=figure.caption if panel.log_y else "")
+                    for panel, figure in zip(part, beside, strict=True)
+                ]
+                panels += [*own, *([Panel("", "", "")] * (2 - len(own)))]
+    return Figure("joint", "Joint found", tuple(panels), 2)
+
+
+def plot(fit: Fit) -> Any:
+    """Draw the joint over frequency, K* and compliance of each DOF, and measured against regenerated FRFs.
+
+    Parameters
+    ----------
+    fit : Fit
+        A fit that was loaded shows no FRFs.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        ``jf.plot(fit).savefig("joint.png")`` writes it.
+
+    Raises
+    ------
+    MissingPackageError
+        matplotlib is missing.
+    """
+    check_type("fit", fit, Fit)
+    return laid_out(fit_overview(fit))

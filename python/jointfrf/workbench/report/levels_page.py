@@ -1,0 +1,163 @@
+"""A joint at several levels, looked at: stiffness and loss factor over amplitude, tables, a page."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from jointfrf.dofs import is_rotation
+from jointfrf.files import write_file
+from jointfrf.kernel.arguments import check_type
+from jointfrf.workbench.amplitude.decay import ModalDecay
+from jointfrf.workbench.amplitude.levels import JointLevel, JointLevels
+from jointfrf.workbench.report.decay_figure import modal_decay_figure
+from jointfrf.workbench.report.document import (
+    Document,
+    Picture,
+    Section,
+    Words,
+    make_document,
+    section_of_command,
+    words_of_findings,
+)
+from jointfrf.workbench.report.draw import draw
+from jointfrf.workbench.report.figure import Curve, Figure, Panel, Ribbon
+from jointfrf.workbench.report.table import Table, csv_cell
+
+__all__ = ["levels_csv", "levels_figure", "write_levels"]
+
+
+def _units(dof: str) -> tuple[str, str]:
+    return ("rad", "N m") if is_rotation(dof) else ("m", "N")
+
+
+def levels_figure(found: JointLevels, dof: str) -> Figure:
+    """Return stiffness and loss factor of a DOF over motion and force, with intervals and the best law."""
+    own, (motion, load) = found.levels[dof], _units(dof)
+    law = found.laws[dof].fits[0] if dof in found.laws else None
+    fitted = {one.amplitude for one in own if one.stiffness.std_error > 0 and one.loss_factor.std_error > 0}
+    at = np.array(sorted(fitted))
+    axes = [(f"amplitude, {motion}", np.array([one.amplitude for one in own]), at)]
+    of_law = at if law is None else at * law.stiffness * np.hypot(1.0, law.loss_factor)
+    name_of_law = "" if law is None else f"law: {law.law}" if law.widened == 1 else f"nearest law: {law.law}"
+    axes.append((f"force, {load}", np.array([one.force for one in own]), of_law))
+    panels = []
+    for name, unit in (("stiffness", f"{load}/{motion}"), ("loss factor", "1")):
+        attribute = name.replace(" ", "_")
+        values = [getattr(one, attribute) for one in own]
+        low, value, high = (np.array([getattr(one, part) for one in values]) for part in ("low", "value", "high"))
+        for label, x, x_law in axes:
+            order = np.argsort(x)
+            curves = [Curve("found", x[order], value[order], "ismm-points")]
+            curves += [] if law is None else [Curve(name_of_law, x_law, getattr(law, attribute), "actual")]
+            ribbon = Ribbon(f"{100 * found.probability:g} %", x[order], low[order], high[order], "ismm")
+            below = label if attribute == "loss_factor" else ""
+            panels.append(Panel("", below, f"{name}, {unit}", tuple(curves), (ribbon,), log_x=True))
+    caption = f"{dof}: stiffness and loss factor over the relative motion in the joint and over its force, peak values"
+    return Figure(f"levels-{dof}", caption, tuple(panels), columns=2)
+
+
+def write_levels(found: JointLevels, path: Path | str, *, command: str = "", modes: Sequence[ModalDecay] = ()) -> Path:
+    """Write a page on a joint at several levels: one HTML file, no link to another.
+
+    Parameters
+    ----------
+    found : JointLevels
+    path : Path or str
+        In a folder that exists.
+    command : str
+        How it was made, as typed.
+    modes : sequence of ModalDecay
+        Free decays that the levels come from; default none.
+
+    Returns
+    -------
+    Path
+        The file written.
+
+    Raises
+    ------
+    MissingPackageError
+        jinja2 or matplotlib is missing.
+    OSError
+        The file cannot be written.
+    """
+    check_type("found", found, JointLevels)
+    figures = [*map(modal_decay_figure, modes), *(levels_figure(found, dof) for dof in found.levels)]
+    left_out = [f"Left out: {test}. {why}" for test, why in found.left_out.items()]
+    sections = [
+        Section(
+            "summary",
+            "Summary",
+            [
+                *([Words(left_out, "warnings")] if left_out else []),
+                Words(list(_sentences(found))),
+                *words_of_findings(found.findings),
+            ],
+        ),
+        Section("levels", "Over amplitude", [Picture(one, draw(one)) for one in figures]),
+        Section("tables", "Tables", [table for dof in found.levels for table in _tables(found, dof)]),
+        section_of_command(command),
+    ]
+    count = max(map(len, found.levels.values()))
+    about = f"Stiffness and loss factor of {', '.join(found.levels)} over the amplitude of the motion in the joint."
+    write_file(Path(path), make_document(Document(f"A joint at {count} levels", about, sections)))
+    return Path(path)
+
+
+def _sentences(found: JointLevels) -> Iterator[str]:
+    for dof, own in found.levels.items():
+        motion, load = _units(dof)
+        ends = own[0], own[-1]
+        k, eta, a = (
+            " to ".join(f"{value:.4g}" for value in values)
+            for values in ([one.stiffness.value for one in ends], [one.loss_factor.value for one in ends],
+                           [one.amplitude for one in ends])
+        )  # fmt: skip
+        yield (
+            f"{dof}: k goes from {k} {load}/{motion}, the loss factor from {eta}, as the amplitude goes from {a} "
+            f"{motion}."
+        )
+        if dof in found.laws:
+            best, *others = found.laws[dof].fits
+            apart = f", {others[0].aicc - best.aicc:.3g} below {others[0].law}" if others else ""
+            fit = f"chi^2 {best.chi_square:.3g} at {best.degrees} degrees of freedom"
+            if best.widened > 1:
+                yield f"{dof}: no law explains the levels within their errors (the nearest, {best.law}, has {fit})."
+            else:
+                yield f"{dof}: the law with the lowest AICc is {best.law}{apart}; {fit}."
+
+
+def _tables(found: JointLevels, dof: str) -> Iterator[Table]:
+    motion, load = _units(dof)
+    columns = ("test", f"amplitude, {motion}", "lines from", "to", f"force, {load}", f"k, {load}/{motion}", "k from",
+               "k to", "loss factor", "loss from", "loss to", "order in ln a")  # fmt: skip
+    yield Table(f"levels-{dof}", f"{dof} over amplitude", columns, tuple(map(_row, found.levels[dof])))
+    if dof in found.laws:
+        fits = found.laws[dof].fits
+        rows = tuple((one.law, one.aicc, one.bic, one.chi_square, float(one.degrees)) for one in fits)
+        yield Table(f"laws-{dof}", f"Laws of {dof}", ("law", "AICc", "BIC", "chi^2", "degrees of freedom"), rows)
+        best = tuple((name, value, *fits[0].intervals[name]) for name, value in fits[0].values.items())
+        title = f"Parameters of {fits[0].law}" + (", which does not fit the levels" if fits[0].widened > 1 else "")
+        yield Table(f"law-{dof}", title, ("parameter", "value", "from", "to"), best)
+
+
+def _row(one: JointLevel) -> tuple[str | float, ...]:
+    k, eta = one.stiffness, one.loss_factor
+    return (one.label, one.amplitude, one.lowest, one.highest, one.force, k.value, k.low, k.high, eta.value, eta.low,
+            eta.high, float(one.order))  # fmt: skip
+
+
+def levels_csv(found: JointLevels) -> str:
+    """Write a line for each level of each DOF: a table of secant stiffness and loss factor."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("dof", "test", "amplitude", "lowest", "highest", "force", "k", "k_low", "k_high", "loss_factor",
+                     "loss_factor_low", "loss_factor_high", "order"))  # fmt: skip
+    for dof, own in found.levels.items():
+        writer.writerows(map(csv_cell, (dof, *_row(one))) for one in own)
+    return text.getvalue()

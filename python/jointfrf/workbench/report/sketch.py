@@ -1,0 +1,469 @@
+"""Sketches: the channels around a joint and what it acts between; the parts of an assembly, its sensors and hits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from html import escape
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.channels.point_lines import Interface
+from jointfrf.dofs import DIRECTIONS, direction_names, rigid_motion
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.workbench.report.document import Sketch
+from jointfrf.workbench.report.table import Cell, Table
+
+__all__ = [
+    "InterfacePoint",
+    "SketchedPart",
+    "assembly_sketch",
+    "interface_points",
+    "interface_sketch",
+    "point_table",
+]
+
+#: Directions on the page, to the right and up, of x, y and z.
+_VIEW = np.array([[0.87, -0.32], [0.0, 0.95], [0.5, 0.42]]).T
+#: Width of the drawing, least and largest height, margin, and size of arrows.
+_WIDTH, _LOW, _HIGH, _MARGIN, _ARROW = 760.0, 170.0, 340.0, 62.0, 34.0
+#: Where the axes of space begin, from the left and from below, and how long they are.
+_CORNER, _AXIS = (34.0, 34.0), 26.0
+#: Letters as large as on a phone, and their width in heights: names that do not overprint there do not elsewhere.
+_FONT, _LETTER = 17.0, 0.58
+#: Where a name may stand about its place, and how far away.
+_AROUND = ((1, -1), (-1, -1), (1, 1), (-1, 1), (0, 1), (0, -1), (1, 0), (-1, 0))
+_DISTANCES = (8.0, 22.0, 40.0, 60.0)
+#: A spring from (0, 0) to (1, 0), six turns high.
+_SPRING = "M0 0H.25L.29 6 .38-6 .46 6 .54-6 .63 6 .71-6 .75 0H1"
+#: Heads of arrows, in the colours of the sides and of the axes.
+_HEADS = "".join(
+    f'<marker id="head-{style}" orient="auto" markerUnits="userSpaceOnUse" markerWidth="8" markerHeight="8" refX="7" '
+    f'refY="3.2" stroke="none"><path class="{style}" stroke="none" d="M0 0L8 3.2 0 6.4z"/></marker>'
+    for style in ("j", "k", "axis")
+)
+#: Points nearer than this share of the extent count as one place.
+_SAME = 1e-6
+#: Directions that differ by less are one.
+_PARALLEL = 1e-6
+#: Directions whose triple product is above this determine a place.
+_INDEPENDENT = 0.1
+#: Sides whose points are nearer on the page are drawn so far apart, each way.
+_APART = 30.0
+
+
+_OnPage = Callable[[FloatArray, int], FloatArray]
+#: Left, top, right and bottom of what is drawn already.
+_Box = tuple[float, float, float, float]
+
+
+class InterfacePoint(NamedTuple):
+    """A measured point: name, side 0 (j) or 1 (k), place in m, directions of its channels, what is known of x, y, z.
+
+    The direction of a channel that measures a rotation is zero; `axes` has its axis.
+    """
+
+    name: str
+    side: int
+    place: FloatArray
+    directions: tuple[FloatArray, ...]
+    axes: tuple[FloatArray, ...]
+    known: tuple[bool, bool, bool] = (True, True, True)
+
+
+def interface_points(interface: Interface) -> list[InterfacePoint]:
+    """Return the points of an interface, with places from the rigid motion of their channels.
+
+    Notes
+    -----
+    A channel along d at r from the reference point moves by r x d for a unit rotation: one direction determines all
+    of r but its part along d, which is taken as zero. Channels without names are points of their own, by their
+    numbers; three in a row that can be at one place, as those of a sensor of three axes, are one.
+    """
+    points = []
+    for name, own in _rows_of_points(interface):
+        motion = interface.motion[own]
+        side = int(motion[0, 6:].any())
+        motion = motion[:, 6 * side : 6 * side + 6]
+        r, free, _ = _place(motion)
+        x, y, z = (interface.placed and bool((abs(free[:, i]) <= _PARALLEL).all()) for i in range(3))
+        ways, axes = tuple(motion[:, :3]), tuple(motion[:, 3:])
+        points.append(InterfacePoint(name, side, interface.references[side] + r, ways, axes, (x, y, z)))
+    return points
+
+
+def _place(motion: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Return where channels are that move so with their reference point.
+
+    Then the directions along which nothing states where they are, shape (n, 3), and by how much the motion departs.
+    """
+    # r x d is linear in r: the sum of r_a times e_a x d.
+    moves = motion[:, :3].any(axis=1)
+    if not moves.any():
+        return np.zeros(3), np.eye(3), 0.0
+    crosses = np.vstack([rigid_motion(d[None], np.zeros(3))[0][:, 3:] for d in motion[moves, :3]])
+    turned = motion[moves, 3:].ravel()
+    r = np.linalg.lstsq(crosses, turned, rcond=None)[0]
+    _, size, rows = np.linalg.svd(crosses)
+    return r, rows[size <= _PARALLEL * size[0]], float(abs(crosses @ r - turned).max())
+
+
+def _rows_of_points(interface: Interface) -> list[tuple[str, list[int]]]:
+    """Return names of points, and the numbers of their channels."""
+    if interface.channels:
+        by_node: dict[int, list[int]] = {}
+        for i, channel in enumerate(interface.channels):
+            by_node.setdefault(channel.node, []).append(i)
+        return [(str(node), own) for node, own in by_node.items()]
+    found: list[tuple[str, list[int]]] = []
+    first, count = 0, len(interface.motion)
+    while first < count:
+        own = [first]
+        if first + 2 < count:
+            motion = interface.motion[first : first + 3]
+            for side in (motion[:, :6], motion[:, 6:]):
+                if abs(np.linalg.det(side[:, :3])) > _INDEPENDENT and _place(side)[2] <= _SAME * abs(side).max():
+                    own = [first, first + 1, first + 2]
+        found.append((f"{own[0]}-{own[-1]}" if len(own) > 1 else str(first), own))
+        first = own[-1] + 1
+    return found
+
+
+def point_table(points: list[InterfacePoint]) -> Table:
+    """Return the points with their places and directions."""
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
+        (
+            p.name,
+            "jk"[p.side],
+            *(float(1e3 * x) if known else None for x, known in zip(np.round(p.place, 9), p.known, strict=True)),
+            ", ".join(map(_axis, p.directions, p.axes)),
+        )
+        for p in points
+    )
+    columns = ("point", "side", "x, mm", "y, mm", "z, mm", "directions")
+    note = "Empty or left out: the file does not state this coordinate, nor do the directions of the channels."
+    return Table(
+        "points", "Points and directions", columns, rows, note="" if all(all(p.known) for p in points) else note
+    )
+
+
+def _axis(direction: FloatArray, axis: FloatArray) -> str:
+    """Return the direction of a channel, or the axis of the rotation that it measures: "+y", "-rz", or components."""
+    direction, kind = (direction, "") if direction.any() else (axis, "r")
+    at = int(np.argmax(abs(direction)))
+    if abs(direction[at]) > 0.999:
+        return f"{'-' if direction[at] < 0 else '+'}{kind}{'xyz'[at]}"
+    return kind + "(" + " ".join(f"{x:.2g}" for x in direction) + ")"
+
+
+def _fitted(flat: FloatArray) -> tuple[FloatArray, float, float]:
+    """Return the middle of points of a drawing, the scale at which they fill it, and its height."""
+    extent = np.ptp(flat, axis=0)
+    sizes = [(size - 2 * _MARGIN) / max(e, _SAME) for size, e in zip((_WIDTH, _HIGH), extent, strict=True)]
+    scale = min(sizes) if extent.max() > _SAME else 1.0
+    height = float(np.clip(extent[1] * scale + 2 * _MARGIN, _LOW, _HIGH))
+    return (flat.min(axis=0) + flat.max(axis=0)) / 2, scale, height
+
+
+def _pair(spot: FloatArray) -> tuple[float, float]:
+    return float(spot[0]), float(spot[1])
+
+
+def _box(x: float, y: float, half: float) -> _Box:
+    return (x - half, y - half, x + half, y + half)
+
+
+def _boxes_along(x: float, y: float, step: FloatArray) -> list[_Box]:
+    """Return boxes that cover an arrow."""
+    return [_box(x + part * float(step[0]), y + part * float(step[1]), 4.0) for part in np.linspace(0, 1, 6)]
+
+
+def _names(wanted: Mapping[str, tuple[float, float]], taken: list[_Box], height: float) -> tuple[str, str]:
+    """Write names beside their places where they overprint nothing; say how many find no such place."""
+    drawn, left = [], 0
+    for text, (x, y) in wanted.items():
+        half_width, half_height = _FONT * _LETTER * len(text) / 2, _FONT / 2
+        for distance, (right, down) in ((d, way) for d in _DISTANCES for way in _AROUND):
+            a, b = x + right * (distance + half_width), y + down * (distance + half_height)
+            box = (a - half_width, b - half_height, a + half_width, b + half_height)
+            is_inside = box[0] >= 0 and box[1] >= 0 and box[2] <= _WIDTH and box[3] <= height
+            if is_inside and not any(_overlap(box, one) for one in taken):
+                break
+        else:
+            left += 1
+            continue
+        taken.append(box)
+        if distance > _DISTANCES[0]:
+            near = (a - right * half_width, b - down * half_height)
+            drawn.append(f'<path class="leader" d="M{x:.1f} {y:.1f}L{near[0]:.1f} {near[1]:.1f}"/>')
+        # Smaller letters, on a wide screen, stay near their place.
+        start, anchor = a - right * half_width, ("middle", "start", "end")[right]
+        base = y - distance if down < 0 else b + 0.35 * _FONT
+        drawn.append(f'<text x="{start:.1f}" y="{base:.1f}" text-anchor="{anchor}">{escape(text)}</text>')
+    said = (
+        f"; {left} name{'s' if left > 1 else ''} without room for {'them' if left > 1 else 'it'} left out"
+        if left
+        else ""
+    )
+    return "".join(drawn), said
+
+
+def _overlap(one: _Box, other: _Box) -> bool:
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
+
+
+def _as_svg(drawn: Sequence[str], height: float) -> str:
+    # Arrows of sides that are drawn apart reach a little above the margin.
+    content = "".join(drawn)
+    return f'<svg viewBox="0 -6 {_WIDTH:g} {height + 6:g}" aria-hidden="true"><defs>{_HEADS}</defs>{content}</svg>'
+
+
+def interface_sketch(interface: Interface, points: list[InterfacePoint], dofs: tuple[str, ...]) -> Sketch:
+    """Draw the points of both sides with their directions, and the joint between the reference points."""
+    places = np.array([p.place for p in points] + list(interface.references))
+    flat = places @ _VIEW.T
+    middle, scale, height = _fitted(flat)
+
+    # Sides that lie on each other are drawn apart.
+    near = _nearest(flat[: len(points)] * scale, np.array([p.side for p in points]))
+    shift = _APART if near < _APART else 0.0
+
+    def at(place: FloatArray, side: int) -> FloatArray:
+        right, up = (place @ _VIEW.T - middle) * scale
+        return np.array([_WIDTH / 2 + right, height / 2 - up + (side - 0.5) * 2 * shift])
+
+    ends = [at(reference, side) for side, reference in enumerate(interface.references)]
+    taken = [_corner_box(height), *(_box(*_pair(end), 10.0) for end in (*ends, (ends[0] + ends[1]) / 2))]
+    drawn = [_links(points, at, side, ends[side]) for side in (0, 1)]
+    drawn += [_point(p, at, taken) for p in points]
+    names: dict[str, tuple[float, float]] = {}
+    for p in points:
+        names[p.name] = _pair(at(p.place, p.side))
+    text, left_out = _names(names, taken, height)
+    drawn += [_spring(*ends), _axes(height), text]
+    sides = [", ".join(p.name for p in points if p.side == side) for side in (0, 1)]
+    apart = 1e3 * float(np.linalg.norm(interface.references[1] - interface.references[0]))
+    where = "at one place" if apart < 1e-6 else f"{apart:.3g} mm apart"
+    caption = (
+        f"Side j (filled): points {sides[0]}; side k (open): points {sides[1]}; arrows: measured directions; spring: "
+        f"the joint in {', '.join(dofs)} between the reference points, which are {where}"
+        + ("; the sides are drawn apart" if shift else "")
+        + left_out
+    )
+    return Sketch("sketch", _as_svg(drawn, height), caption, f"Sketch of the joint. {caption}.")
+
+
+def _nearest(flat: FloatArray, side: NDArray[np.intp]) -> float:
+    """Return the smallest distance on the page between points of both sides."""
+    between = flat[side == 0][:, None] - flat[side == 1][None]
+    return float(np.linalg.norm(between, axis=2).min(initial=np.inf))
+
+
+def _links(points: list[InterfacePoint], at: _OnPage, side: int, end: FloatArray) -> str:
+    own = [at(p.place, side) for p in points if p.side == side]
+    path = "".join(f"M{end[0]:.1f} {end[1]:.1f}L{x:.1f} {y:.1f}" for x, y in own)
+    return f'<path class="{"jk"[side]} link" stroke-width="1.2" stroke-dasharray="{("none", "5 3")[side]}" d="{path}"/>'
+
+
+def _point(point: InterfacePoint, at: _OnPage, taken: list[_Box]) -> str:
+    x, y = _pair(at(point.place, point.side))
+    side = "jk"[point.side]
+    drawn = [
+        f'<circle class="{side}{" open" if point.side else ""}" cx="{x:.1f}" cy="{y:.1f}" r="4.5" stroke-width="2"/>'
+    ]
+    taken.append(_box(x, y, 6.0))
+    for direction in point.directions:
+        step = (_VIEW @ direction) * (1, -1) * _ARROW
+        taken += _boxes_along(x, y, step)
+        drawn.append(_arrow(side, x, y, step))
+    return "".join(drawn)
+
+
+def _arrow(style: str, x: float, y: float, step: FloatArray) -> str:
+    shaft = f"M{x:.1f} {y:.1f}l{step[0]:.1f} {step[1]:.1f}"
+    return f'<path class="{style} link" stroke-width="1.6" marker-end="url(#head-{style})" d="{shaft}"/>'
+
+
+def _spring(first: FloatArray, last: FloatArray) -> str:
+    """Draw a spring between two places."""
+    step = last - first
+    length = max(float(np.hypot(*step)), 1.0)
+    place = ", ".join(f"{x:.3f}" for x in (*step, -step[1] / length, step[0] / length, *first))
+    look = 'stroke-width="1.6" stroke-linejoin="round" vector-effect="non-scaling-stroke"'
+    return f'<path class="joint open" {look} transform="matrix({place})" d="{_SPRING}"/>'
+
+
+def _corner_box(height: float) -> _Box:
+    """Return where the axes of space are drawn."""
+    return (0.0, height - _CORNER[1] - 1.6 * _AXIS, _CORNER[0] + 1.6 * _AXIS, height)
+
+
+def _axes(height: float, view: FloatArray = _VIEW) -> str:
+    """Draw the axes of space in the corner."""
+    drawn, corner = [], np.array([_CORNER[0], height - _CORNER[1]])
+    for letter, direction in zip("xyz", view.T, strict=True):
+        step = direction * (1, -1) * _AXIS
+        a, b = corner + 1.38 * step
+        drawn.append(_arrow("axis", *_pair(corner), step))
+        drawn.append(f'<text x="{a:.1f}" y="{b + 4:.1f}" text-anchor="middle" font-style="italic">{letter}</text>')
+    return "".join(drawn)
+
+
+class SketchedPart(NamedTuple):
+    """A part of an assembly: its name, where its nodes are, m, in axes of its own, and which are at which joint."""
+
+    letter: str
+    places: Mapping[str, FloatArray]
+    joints: Mapping[str, Sequence[str]]
+
+    def ends(self) -> dict[str, FloatArray]:
+        """Return where it has each joint, m, as far as that is known."""
+        known = {
+            name: [self.places[node] for node in nodes if node in self.places] for name, nodes in self.joints.items()
+        }
+        return {name: np.mean(own, axis=0) for name, own in known.items() if own}
+
+
+def _moved_parts(
+    parts: Sequence[SketchedPart],
+) -> tuple[list[dict[str, FloatArray]], dict[str, dict[int, FloatArray]]] | None:
+    """Return places of nodes with all parts where they meet, and the ends of joints, m; None where a part meets none.
+
+    The first part stays where it is. One after the other the rest follows, each to where its joints with those before
+    it lie in the mean on theirs.
+    """
+    ends = [part.ends() for part in parts]
+    shift: dict[int, FloatArray] = {0: np.zeros(3)}
+    while len(shift) < len(parts):
+        for i, own in enumerate(ends):
+            met = [ends[k][name] + by - own[name] for k, by in shift.items() for name in own.keys() & ends[k].keys()]
+            if i not in shift and met:
+                shift[i] = np.mean(met, axis=0)
+                break
+        else:
+            return None
+    if not all(ends):
+        return None
+    moved = [{node: at + shift[i] for node, at in part.places.items()} for i, part in enumerate(parts)]
+    joints: dict[str, dict[int, FloatArray]] = {}
+    for i, own in enumerate(ends):
+        for name, at in own.items():
+            joints.setdefault(name, {})[i] = at + shift[i]
+    return moved, joints
+
+
+def _levels(count: int, joints: Mapping[str, Mapping[int, FloatArray]]) -> list[int]:
+    """Return how many joints lead from the first part to each: neighbours are drawn apart, and in other colours."""
+    levels = {0: 0}
+    while len(levels) < count:
+        level = max(levels.values()) + 1
+        next_to = {i for own in joints.values() if own.keys() & levels.keys() for i in own} - levels.keys()
+        levels.update(dict.fromkeys(next_to, level))
+    return [levels[i] for i in range(count)]
+
+
+#: Nodes of a part that are drawn at most: more are a grey body.
+_MOST_NODES = 400
+
+
+def assembly_sketch(parts: Sequence[SketchedPart], sensors: Sequence[str], hits: Sequence[str]) -> Sketch | None:
+    """Draw the parts of an assembly and its joints, sensors and hits; None where places of nodes are not known.
+
+    Parameters
+    ----------
+    parts : sequence of SketchedPart
+        All but the first are moved to where their nodes at joints lie on those of others.
+    sensors, hits : sequence of str
+        DOFs ``"A/7:y"``.
+    """
+    placed = _moved_parts(parts)
+    if placed is None:
+        return None
+    moved, joints = placed
+    levels = _levels(len(parts), joints)
+    every = np.array([at for own in moved for at in own.values()])
+    view = _view_along(int(np.argmax(np.ptp(every, axis=0))))
+    flat = every @ view.T
+    middle, scale, height = _fitted(flat)
+
+    def at(place: FloatArray, side: int) -> FloatArray:
+        right, up = (place @ view.T - middle) * scale
+        return np.array([_WIDTH / 2 + right, height / 2 - up + (2 * levels[side] - 1) * _LIFT])
+
+    drawn: list[str] = []
+    styles = ["jk"[level % 2] for level in levels]
+    for side, own in enumerate(moved):
+        step = max(1, len(own) // _MOST_NODES)
+        spots = (at(place, side) for place in list(own.values())[::step])
+        drawn += [f'<circle class="{styles[side]} node" cx="{x:.1f}" cy="{y:.1f}" r="1.6"/>' for x, y in spots]
+    letters = [part.letter for part in parts]
+    names: dict[str, tuple[float, float]] = {}
+    taken = [_corner_box(height)]
+    for name, ends in joints.items():
+        first, last = ([at(place, side) for side, place in ends.items()] * 2)[:2]
+        if len(ends) == 1:  # the ground
+            last = first + np.array([0.0, 2 * _LIFT])
+            drawn.append(f'<path class="joint open" d="M{last[0] - 7:.1f} {last[1]:.1f}h14"/>')
+        drawn.append(_spring(first, last))
+        spot = _pair((first + last) / 2)
+        taken.append(_box(*spot, 12.0))
+        names |= {name: spot} if name else {}
+    if len(parts) > 2:
+        for side, own in enumerate(moved):
+            names.setdefault(letters[side], _pair(at(np.mean(list(own.values()), axis=0), side)))
+    for dofs, draw in ((hits, _hit), (sensors, _sensor)):
+        for dof in dofs:
+            letter, _, rest = dof.partition("/")
+            node, _, direction = rest.rpartition(":")
+            side = letters.index(letter)
+            if node in moved[side]:
+                spot_of = at(moved[side][node], side)
+                along = _on_page(direction, view)
+                drawn.append(draw(styles[side], spot_of, along))
+                names[dof] = _pair(spot_of)
+                taken.append(_box(*names[dof], 7.0))
+                taken += _boxes_along(*names[dof], -along * _ARROW) if draw is _hit else []
+    text, left_out = _names(names, taken, height)
+    drawn += [_axes(height, view), text]
+    named = [name for name in joints if name]
+    if len(parts) == 2:
+        nodes = f"{letters[0]} and of {letters[1]} (drawn below it, where they meet)"
+    else:
+        nodes = f"{', '.join(letters)}, where they meet (drawn apart)"
+    springs = f"springs: the joints {', '.join(named)}" if named else "spring: the joint"
+    caption = f"Nodes of {nodes}; squares: sensors; arrows: hits; {springs}{left_out}"
+    words = f"Sensors at {', '.join(sensors)}; hits at {', '.join(hits)}."
+    return Sketch("assembly", _as_svg(drawn, height), caption, f"Sketch of the assembly. {words}")
+
+
+#: How far parts are drawn apart where they meet, each way.
+_LIFT = 9.0
+
+
+def _view_along(axis: int) -> FloatArray:
+    """Return directions on the page of x, y and z, with one of them to the right: never a mirror image."""
+    right, up, away = _VIEW.T
+    return np.array([[right, up, away], [away, right, up], [-away, up, right]][axis]).T
+
+
+def _on_page(direction: str, view: FloatArray) -> FloatArray:
+    """Return the step on the page of a direction such as ``y``; up where it is none in space."""
+    try:
+        name = direction_names([direction.lstrip("+-")])[0]
+        unit = np.eye(6)[DIRECTIONS.index(name)][:3]
+    except ValueError:
+        unit = np.zeros(3)
+    step = (view @ unit) * (1, -1)
+    return np.asarray(step if unit.any() else np.array([0.0, -1.0]))
+
+
+def _sensor(style: str, spot: FloatArray, step: FloatArray) -> str:
+    x, y = spot + 5 * step
+    return f'<rect class="{style}" x="{x - 4.5:.1f}" y="{y - 4.5:.1f}" width="9" height="9"/>'
+
+
+def _hit(style: str, spot: FloatArray, step: FloatArray) -> str:
+    """Draw an arrow that ends at a place, from the side away from the sensors."""
+    x, y = spot - 4 * step
+    return _arrow(style, float(x - step[0] * _ARROW), float(y - step[1] * _ARROW), step * _ARROW)

@@ -1,0 +1,506 @@
+"""Contact between pairs of nodes: unilateral, with Coulomb friction, by an active set (4.1)-(4.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+from scipy.sparse import linalg as sparse_linalg
+
+from jointfrf.kernel.arguments import FloatArray, as_count, as_not_negative, as_positive, as_real
+from jointfrf.models.factors import SYMMETRIC
+
+__all__ = ["ContactInterface", "ContactLaw", "InterfaceState", "Iteration", "Pairs", "solve_contact", "tie"]
+
+BoolArray = NDArray[np.bool_]
+
+#: Contact acts along y; x and z are tangential.
+NORMAL: Final = 1
+TANGENTIAL: Final = np.array([0, 2])
+#: Tension and penetration count as zero below this share of the largest normal force or relative displacement.
+_ROUNDING: Final = 1e-9
+#: Friction forces of slipping pairs must repeat to this share of the largest normal force.
+_REPEAT: Final = 1e-6
+#: Stiffness of the springs that hold slipping pairs, as a share of that of a node.
+_SOFT: Final = 1e-8
+#: A pivot below this share of the largest means a body that can move freely.
+_SINGULAR: Final = 1e-13
+
+
+@dataclass(frozen=True)
+class ContactLaw:
+    """How faces resist each other.
+
+    Parameters
+    ----------
+    friction : float
+        Coulomb's mu (4.1).
+    normal_stiffness, tangential_stiffness : float or None
+        Pressure over overlap and shear stress over elastic slip, N/m^3. The defaults are of the order of machined metal
+        faces under high pressure. None is rigid: closed pairs do not overlap, sticking pairs do not move at all, and
+        their nodes are tied exactly.
+
+    Raises
+    ------
+    ValueError
+        Negative friction, a stiffness that is not positive.
+
+    Examples
+    --------
+    >>> from jointfrf.workbench.solids.contact import ContactLaw
+    >>> ContactLaw(friction=0.2)
+    ContactLaw(friction=0.2, normal_stiffness=100000000000000.0, tangential_stiffness=10000000000000.0)
+    """
+
+    friction: float = 0.3
+    normal_stiffness: float | None = 1e14
+    tangential_stiffness: float | None = 1e13
+
+    def __post_init__(self) -> None:
+        as_not_negative("friction", self.friction)
+        for name in ("normal_stiffness", "tangential_stiffness"):
+            value = getattr(self, name)
+            if value is not None:
+                as_positive(name, value, "N/m^3 (None: rigid)")
+
+
+@dataclass(frozen=True)
+class ContactInterface:
+    """Two faces that may touch, given by pairs of nodes.
+
+    Attributes
+    ----------
+    lower, upper : ndarray of int, shape (n_pairs,)
+        Nodes of the body on the side of lower y, and their partners on the body above, counted from 0.
+    area : ndarray, shape (n_pairs,)
+        Of each pair, m^2.
+    gap : ndarray, shape (n_pairs,), optional
+        Distance along y before loading, m; zero by default.
+    """
+
+    lower: NDArray[np.int32]
+    upper: NDArray[np.int32]
+    area: FloatArray
+    gap: FloatArray | None = None
+
+    def gaps(self) -> FloatArray:
+        """Return the distance of all pairs before loading, m."""
+        return np.zeros(len(self.lower)) if self.gap is None else self.gap
+
+
+class Pairs:
+    """The pairs of several interfaces in one row.
+
+    Parameters
+    ----------
+    interfaces : mapping of str to ContactInterface
+        No node may belong to two pairs.
+    n : int
+        Number of DOFs: x, y, z of node 0, then of node 1, ...; others may follow.
+    """
+
+    def __init__(self, interfaces: Mapping[str, ContactInterface], n: int) -> None:
+        if not interfaces:
+            raise ValueError("interfaces must name at least one interface")
+        for name, one in interfaces.items():
+            counts = {len(one.lower), len(one.upper), len(one.area), len(one.gaps())}
+            if len(counts) != 1 or counts == {0}:
+                raise ValueError(f"interfaces: {name!r} must have pairs, with an area and a gap for each")
+            if (one.gaps() < 0).any() or (one.area <= 0).any():
+                raise ValueError(f"interfaces: {name!r} must have positive areas and gaps that are not negative")
+        ends = np.cumsum([len(one.lower) for one in interfaces.values()]).tolist()
+        self.parts = {name: slice(a, b) for name, a, b in zip(interfaces, [0, *ends], ends, strict=False)}
+        every = list(interfaces.values())
+        self.lower = np.concatenate([one.lower for one in every]).astype(np.int64)
+        self.upper = np.concatenate([one.upper for one in every]).astype(np.int64)
+        self.area = np.concatenate([one.area for one in every])
+        self.gap = np.concatenate([one.gaps() for one in every])
+        self.n = n
+        nodes = np.concatenate([self.lower, self.upper])
+        if np.unique(nodes).size != nodes.size:
+            raise ValueError("interfaces: a node belongs to two pairs")
+        if nodes.min() < 0 or 3 * nodes.max() + 2 >= n:
+            raise ValueError(f"interfaces: a node is none of the {n // 3} of the stiffness")
+        self.up = 3 * self.upper[:, None] + np.arange(3)
+        self.low = 3 * self.lower[:, None] + np.arange(3)
+
+    def tied(self, law: ContactLaw, closed: BoolArray, sticking: BoolArray) -> BoolArray:
+        """Return the directions in which upper nodes follow the lower ones exactly, (n_pairs, 3)."""
+        tied = np.zeros((len(self.area), 3), bool)
+        if law.normal_stiffness is None:
+            tied[closed, NORMAL] = True
+        if law.tangential_stiffness is None:
+            tied[np.ix_(sticking, TANGENTIAL)] = True
+        return tied
+
+    def springs(self, law: ContactLaw, closed: BoolArray, sticking: BoolArray) -> sparse.csr_array:
+        """Return the stiffness of the pairs that are held by springs, (n, n)."""
+        stiffness = np.zeros((len(self.area), 3, 3))
+        if law.normal_stiffness is not None:
+            stiffness[closed, NORMAL, NORMAL] = law.normal_stiffness * self.area[closed]
+        if law.tangential_stiffness is not None:
+            for axis in TANGENTIAL.tolist():
+                stiffness[sticking, axis, axis] = law.tangential_stiffness * self.area[sticking]
+        return self.between(stiffness)
+
+    def between(self, stiffness: FloatArray) -> sparse.csr_array:
+        """Return springs between the nodes of each pair, given by blocks (n_pairs, 3, 3) in N/m."""
+        used = stiffness.any(axis=(1, 2))
+        blocks = stiffness[used]
+        ends = np.concatenate([self.up[used], self.low[used]], axis=1)
+        both = np.block([[blocks, -blocks], [-blocks, blocks]])
+        rows, columns = np.broadcast_arrays(ends[:, :, None], ends[:, None, :])
+        matrix = sparse.csr_array((both.ravel(), (rows.ravel(), columns.ravel())), shape=(self.n, self.n))
+        matrix.eliminate_zeros()
+        return matrix
+
+
+def tie(pairs: Pairs, tied: BoolArray, fixed: ArrayLike = ()) -> tuple[sparse.csr_array, NDArray[np.int64]]:
+    """Expand independent displacements to all: tied nodes follow their partners, which eliminates them exactly.
+
+    Parameters
+    ----------
+    pairs : Pairs
+    tied : ndarray of bool, shape (n_pairs, 3)
+        Directions in which the upper node follows the lower one.
+    fixed : array_like of int
+        DOFs that do not move.
+
+    Returns
+    -------
+    expansion : csr_array, shape (n, n_independent)
+        Of zeros and ones.
+    independent : ndarray of int, shape (n_independent,)
+        These DOFs, ascending.
+    """
+    n = pairs.n
+    followers, leaders = pairs.up[tied], pairs.low[tied]
+    independent = np.ones(n, bool)
+    independent[np.asarray(fixed, np.int64)] = False
+    stands_for = np.arange(n)
+    stands_for[followers] = leaders
+    # Where a follower is fixed and its leader is not, the leader is fixed too.
+    independent[leaders[~independent[followers]]] = False
+    rows = np.flatnonzero(independent[stands_for])
+    independent[followers] = False
+    column = np.cumsum(independent) - 1
+    entries = (np.ones(rows.size), (rows, column[stands_for[rows]]))
+    return sparse.csr_array(entries, shape=(n, int(independent.sum()))), np.flatnonzero(independent)
+
+
+@dataclass(frozen=True)
+class InterfaceState:
+    """What an interface carries, pair by pair.
+
+    Attributes
+    ----------
+    closed, slipping : ndarray of bool, shape (n_pairs,)
+        Pairs in contact, and those among them at the limit of friction.
+    force : ndarray, shape (n_pairs, 3)
+        On the upper body, N.
+    pressure : ndarray, shape (n_pairs,)
+        Normal force over area, Pa.
+    separation : ndarray, shape (n_pairs,)
+        Distance along y, m; negative where closed pairs of finite stiffness overlap.
+    slide : ndarray, shape (n_pairs, 2)
+        Of the upper node against the lower one along x and z, m.
+    slip_ratio : ndarray, shape (n_pairs,)
+        Shear stress over its limit mu p (4.1)-(4.2): 1 where slipping, 0 where open or without friction.
+    """
+
+    closed: BoolArray
+    slipping: BoolArray
+    force: FloatArray
+    pressure: FloatArray
+    separation: FloatArray
+    slide: FloatArray
+    slip_ratio: FloatArray
+
+    @property
+    def normal_force(self) -> float:
+        """Resultant that presses the two bodies together, N."""
+        return float(self.force[:, NORMAL].sum())
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One solution with a given set of contacts.
+
+    Attributes
+    ----------
+    closed, slipping : int
+        Pairs that were.
+    changed : int
+        Pairs whose state the solution contradicts; none in the last iteration.
+    residual : float
+        Forces out of balance over the largest load.
+    """
+
+    closed: int
+    slipping: int
+    changed: int
+    residual: float
+
+
+@dataclass(frozen=True)
+class ContactSolution:
+    """Static equilibrium.
+
+    Attributes
+    ----------
+    displacement : ndarray, shape (n,)
+        Of all DOFs.
+    interfaces : dict of str to InterfaceState
+    history : tuple of Iteration
+    """
+
+    displacement: FloatArray
+    interfaces: dict[str, InterfaceState]
+    history: tuple[Iteration, ...]
+
+
+def solve_contact(
+    stiffness: sparse.sparray,
+    load: ArrayLike,
+    interfaces: Mapping[str, ContactInterface],
+    law: ContactLaw | None = None,
+    *,
+    fixed: ArrayLike = (),
+    max_iterations: int = 50,
+) -> ContactSolution:
+    """Find the static equilibrium of elastic bodies that touch at pairs of nodes, small displacements.
+
+    Parameters
+    ----------
+    stiffness : sparse array, shape (n, n)
+        Symmetric, N/m: x, y, z of node 0, then of node 1, ...; other DOFs may follow.
+    load : array_like, shape (n,)
+        N. It is applied in one step from the unloaded state.
+    interfaces : mapping of str to ContactInterface
+        No node may belong to two pairs.
+    law : ContactLaw, optional
+        ``ContactLaw()`` by default.
+    fixed : array_like of int
+        DOFs that are held.
+    max_iterations : int
+
+    Returns
+    -------
+    ContactSolution
+
+    Raises
+    ------
+    ValueError
+        Arguments of wrong shape or range; a body that is held neither by supports nor by contact; an interface that
+        opens everywhere; no convergence.
+
+    Notes
+    -----
+    All pairs begin closed and sticking, which holds every body that touches a supported one. A closed pair in tension
+    opens, an open one that overlaps closes (primal-dual active set). A sticking pair beyond the cone slips: its shear
+    force is mu p against the sliding, solved for together with p, and its direction is found by Newton's method. A
+    slipping pair that is pushed back sticks again. The load comes in one step, so its path is not traced: exact where
+    the contacts do not depend on the level of the load, as without gaps and slip.
+
+    Slipping pairs are also held by springs of 1e-8 of the stiffness of a node, for bodies that only friction holds;
+    without slip there is no regularisation.
+
+    Examples
+    --------
+    Two cubes of 10 mm, one on the other, pressed together:
+
+    >>> import numpy as np
+    >>> from jointfrf.workbench.solids.brick import Material, assemble_bricks
+    >>> from jointfrf.workbench.solids.contact import ContactInterface, solve_contact
+    >>> corners = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])
+    >>> nodes = [[0.01 * x, y, 0.01 * z] for y in (0.0, 0.01, 0.01, 0.02) for x, z in corners]
+    >>> k, _ = assemble_bricks(nodes, [range(8), range(8, 16)], Material(70e9, 0.0, 2700.0))
+    >>> load = np.zeros(48)
+    >>> load[37::3] = -100.0
+    >>> faces = ContactInterface(np.arange(4, 8), np.arange(8, 12), np.full(4, 25e-6))
+    >>> found = solve_contact(k, load, {"faces": faces}, fixed=range(12)).interfaces["faces"]
+    >>> (found.pressure / 1e6).round(9).tolist()
+    [4.0, 4.0, 4.0, 4.0]
+    """
+    k = sparse.csr_array(stiffness)
+    f = as_real("load", load, (k.shape[0],))
+    max_iterations = as_count("max_iterations", max_iterations)
+    if not f.any():
+        raise ValueError("load must not be zero everywhere")
+    problem = _Problem(k, f, Pairs(interfaces, k.shape[0]), law or ContactLaw(), np.asarray(fixed, np.int64))
+    return problem.iterate(max_iterations)
+
+
+@dataclass
+class _Contacts:
+    """A set of contacts.
+
+    Attributes
+    ----------
+    closed, slipping : ndarray of bool, shape (n_pairs,)
+    direction : ndarray, shape (n_pairs, 2)
+        Of the slide, unit vector of x and z.
+    turning : ndarray, shape (n_pairs,)
+        Stiffness of the shear force against a slide across its direction, N/m.
+    """
+
+    closed: BoolArray
+    slipping: BoolArray
+    direction: FloatArray
+    turning: FloatArray
+
+    def sticking(self) -> BoolArray:
+        return self.closed & ~self.slipping
+
+
+class _Problem:
+    """Iteration over sets of contacts."""
+
+    def __init__(
+        self, k: sparse.csr_array, f: FloatArray, pairs: Pairs, law: ContactLaw, fixed: NDArray[np.int64]
+    ) -> None:
+        self.k, self.f, self.pairs, self.law, self.fixed = k, f, pairs, law, fixed
+        self.node_stiffness = float(np.median(k.diagonal()[pairs.up]))
+
+    def iterate(self, max_iterations: int) -> ContactSolution:
+        count = len(self.pairs.area)
+        slips = np.full(count, self.law.friction == 0)
+        contacts = _Contacts(np.ones(count, bool), slips, np.zeros((count, 2)), np.zeros(count))
+        history: list[Iteration] = []
+        for _ in range(max_iterations):
+            u, residual = self.solve(contacts)
+            force = (self.k @ u - self.f)[self.pairs.up]
+            relative = u[self.pairs.up] - u[self.pairs.low]
+            after = self.judged(contacts, force, relative)
+            history.append(self.record(contacts, after, force, residual))
+            if history[-1].changed == 0:
+                return ContactSolution(u, self.states(contacts, force, relative), tuple(history))
+            contacts = after
+            for name, part in self.pairs.parts.items():
+                if not contacts.closed[part].any():
+                    raise ValueError(f"interface {name!r} opens everywhere; apply a load that it can carry")
+        raise ValueError(
+            f"the contact did not converge in {max_iterations} iterations, {history[-1].changed} of {count} pairs "
+            "still change; try more iterations, a finer mesh or a tangential stiffness"
+        )
+
+    def solve(self, contacts: _Contacts) -> tuple[FloatArray, float]:
+        """Return the displacements with these contacts, and the forces left out of balance over the largest load."""
+        pairs, law, n = self.pairs, self.law, len(self.f)
+        closed, sticking = contacts.closed, contacts.sticking()
+        t, _ = tie(pairs, pairs.tied(law, closed, sticking), self.fixed)
+        gap = np.zeros(n)
+        gap[pairs.up[closed, NORMAL]] = pairs.gap[closed]
+        start = -gap if law.normal_stiffness is None else np.zeros(n)
+        springs = pairs.springs(law, closed, sticking)
+        k, f = self.k, self.f
+        slips = closed & contacts.slipping
+        if slips.any():
+            springs = springs + pairs.between(self.slip_stiffness(contacts, slips))
+            shear = self.friction_rows(contacts, slips)
+            k, f = k + shear @ k, f + shear @ f
+        matrix = sparse.csc_array(t.T @ (k + springs) @ t)
+        right = t.T @ (f - k @ start - springs @ (start + gap))
+        try:
+            factors = sparse_linalg.splu(matrix, **SYMMETRIC)
+            pivots = abs(factors.U.diagonal())
+            regular = pivots.min() > _SINGULAR * pivots.max()
+        except RuntimeError:  # exactly singular
+            regular = False
+        if not regular:
+            raise ValueError(
+                "a body can move freely: neither a support nor contact with a body that is supported holds it"
+            )
+        q = factors.solve(right)
+        u: FloatArray = t @ q + start
+        return u, float(abs(matrix @ q - right).max() / abs(self.f).max())
+
+    def slip_stiffness(self, contacts: _Contacts, slips: BoolArray) -> FloatArray:
+        """Return the springs of slipping pairs: soft ones, and what shear gains as its direction turns.
+
+        Shear -mu p w/|w| changes with the slide w, across its direction d, by mu p/|w|: Newton's method.
+        """
+        d = contacts.direction[slips]
+        across = np.eye(2) - d[:, :, None] * d[:, None, :]
+        blocks = np.zeros((len(slips), 3, 3))
+        blocks[np.ix_(slips, TANGENTIAL, TANGENTIAL)] = contacts.turning[
+            slips, None, None
+        ] * across + _SOFT * self.node_stiffness * np.eye(2)
+        return blocks
+
+    def friction_rows(self, contacts: _Contacts, slips: BoolArray) -> sparse.csr_array:
+        """Return what adds mu p d to the tangential equations of slipping pairs, p the residual of the normal one.
+
+        The shear force on an upper node is -mu p d; the lower one takes the opposite.
+        """
+        pairs, n = self.pairs, len(self.f)
+        normal = pairs.up[slips, NORMAL]
+        share = self.law.friction * contacts.direction[slips]
+        rows = np.concatenate([side[slips, axis] for side in (pairs.up, pairs.low) for axis in TANGENTIAL.tolist()])
+        values = np.concatenate([share[:, 0], share[:, 1], -share[:, 0], -share[:, 1]])
+        return sparse.csr_array((values, (rows, np.tile(normal, 4))), shape=(n, n))
+
+    def judged(self, contacts: _Contacts, force: FloatArray, relative: FloatArray) -> _Contacts:
+        """Return the contacts that follow from the solution."""
+        normal, shear, slide = force[:, NORMAL], force[:, TANGENTIAL], relative[:, TANGENTIAL]
+        separation = self.pairs.gap + relative[:, NORMAL]
+        closed = np.where(
+            contacts.closed, normal > -_ROUNDING * abs(normal).max(), separation < -_ROUNDING * abs(relative).max()
+        )
+        if self.law.friction == 0:
+            return _Contacts(closed, contacts.slipping, contacts.direction, contacts.turning)
+        limit = self.law.friction * np.maximum(normal, 0)
+        along = (slide * contacts.direction).sum(axis=1)
+        elastic = np.zeros(len(limit))
+        if self.law.tangential_stiffness is not None:
+            elastic = limit / (self.law.tangential_stiffness * self.pairs.area)
+        goes_on = contacts.slipping & (along > elastic)
+        starts = ~contacts.slipping & (np.linalg.norm(shear, axis=1) > limit * (1 + _ROUNDING))
+        slipping = closed & contacts.closed & (goes_on | starts)
+        towards = np.where(goes_on[:, None], slide, -shear)
+        length = np.where(slipping, np.linalg.norm(towards, axis=1), 1.0)
+        return _Contacts(
+            closed,
+            slipping,
+            np.where(slipping[:, None], towards / length[:, None], 0.0),
+            np.where(slipping & goes_on, limit / length, 0.0),
+        )
+
+    def record(self, before: _Contacts, after: _Contacts, force: FloatArray, residual: float) -> Iteration:
+        normal = np.maximum(force[:, NORMAL], 0)
+        turned = self.law.friction * normal * np.linalg.norm(after.direction - before.direction, axis=1)
+        changed = (
+            (before.closed != after.closed)
+            | (after.closed & (before.slipping != after.slipping))
+            | (turned > _REPEAT * normal.max())
+        )
+        return Iteration(
+            closed=int(before.closed.sum()),
+            slipping=int((before.closed & before.slipping).sum()),
+            changed=int(changed.sum()),
+            residual=residual,
+        )
+
+    def states(self, contacts: _Contacts, force: FloatArray, relative: FloatArray) -> dict[str, InterfaceState]:
+        closed = contacts.closed
+        carried = np.where(closed[:, None], force, 0.0)
+        normal = carried[:, NORMAL]
+        shear = np.linalg.norm(carried[:, TANGENTIAL], axis=1)
+        limit = self.law.friction * normal
+        each = {
+            "closed": closed,
+            "slipping": closed & contacts.slipping,
+            "force": carried,
+            "pressure": normal / self.pairs.area,
+            "separation": self.pairs.gap + relative[:, NORMAL],
+            "slide": relative[:, TANGENTIAL],
+            "slip_ratio": np.divide(shear, limit, out=np.zeros_like(shear), where=limit > 0),
+        }
+        return {
+            name: InterfaceState(**{key: value[part] for key, value in each.items()})
+            for name, part in self.pairs.parts.items()
+        }
