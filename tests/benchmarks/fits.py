@@ -89,7 +89,7 @@ def _time(one: _Timed, repetitions: int, unit: Callable[[], float]) -> None:
                 limits = found.confidence_interval(0.95)
                 held += [limits[key][0] <= true <= limits[key][1] for key, true in one.truth.items() if key in limits]
     shown = f"{sum(held)} of {len(held)}" if held else ""
-    row = f"{min(seconds):.3g} | {np.median(seconds):.3g} | {np.median(units):.2g}"
+    row = f"{min(seconds):.3g} | {np.median(seconds):.3g} | {np.median(units):.3g}"
     print(f"| {one.name} | {row} | {shown} |", flush=True)
 
 
