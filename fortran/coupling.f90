@@ -7,10 +7,10 @@ module jointfrf_coupling
   use jointfrf_lanes, only: element_matrix, element_space, lane_kernels, lanes, largest_solved, largest_product, &
     padded, real_lines, rows_in_memory
   use jointfrf_line_layout, only: all_finite, load, store
-  use jointfrf_lines_lapack, only: product_block
-  use jointfrf_modification, only: apply_in_lanes, apply_modification, find_forces, forces_in_lanes, &
-    modification_in_lanes, modification_matrices, plan_forces, plan_modification, take_matrices
-  use jointfrf_status, only: line_not_finite
+  use jointfrf_lines_lapack, only: product_block, room_to_solve
+  use jointfrf_modification, only: apply_in_lanes, find_forces, find_line_forces, forces_in_lanes, &
+    modification_in_lanes, plan_forces, plan_modification
+  use jointfrf_status, only: line_good, line_not_finite, line_overflow
   use jointfrf_sweep, only: line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
@@ -20,7 +20,7 @@ module jointfrf_coupling
   !> second number on where a fifth of them are joint DOFs; with AVX-512 not before a block leaves the caches.
   integer, parameter :: fewest_for_blas(2) = [96, 64], fewest_with_avx512(2) = [largest_product + 1, 120]
   !> More elements than these, of which a system for the forces consists, leave the caches.
-  integer, parameter :: most_in_system = 12288
+  integer, parameter :: most_in_system = 12000
 
   type, extends(line_operation) :: coupling
     logical :: transposed
@@ -300,6 +300,11 @@ contains
 
     h(:n_a, :n_a) = h_a
     h(n_a + 1:, n_a + 1:) = h_b
+    if (min(n_a, n_b, n_j) == 0) then                ! no product; each substructure has all joint DOFs
+      h(:n_a, n_a + 1:) = 0
+      h(n_a + 1:, :n_a) = 0
+      return
+    end if
     call take_columns(transposed, h_a, dofs_a, columns)
     call add_product(n_a, 1, n_a, 1, -1.0_dp, 1.0_dp)
     call add_product(n_a, 1, n_b, n_a + 1, 1.0_dp, 0.0_dp)
@@ -346,47 +351,71 @@ contains
     end if
   end subroutine take_columns
 
+  !> As `couple_large_block`, with forces by LAPACK.
   subroutine couple_one(self, i, space, line_info, rcond)
     class(coupling), intent(in) :: self
     integer, intent(in) :: i
     type(line_space), target, intent(inout) :: space
     integer(ip), intent(out) :: line_info
     real(dp), intent(out) :: rcond
-    complex(dp), pointer, contiguous :: h_a(:, :), h_b(:, :)
-    type(modification_matrices) :: m
+    complex(dp), pointer, contiguous :: k_joint(:, :), rows(:, :), h_relative(:, :), system(:, :), forces(:, :)
+    complex(dp), pointer, contiguous :: stored(:, :), columns(:, :)
+    integer :: n, n_j
 
-    call space%take(self%n_a, self%n_a, h_a)
-    call space%take(self%n_b, self%n_b, h_b)
-    call take_matrices(self%n_a + self%n_b, self%n_j, space, m)
+    n = self%n_a + self%n_b
+    n_j = self%n_j
+    call space%take(n_j, n_j, k_joint)
+    call space%take(n_j, n, rows)
+    call space%take(n_j, n_j, h_relative)
+    call space%take(n_j, n_j, system)
+    call space%take(n_j, n, forces)
+    call space%take(merge(n, n_j, self%transposed), merge(n_j, n, self%transposed), stored)
+    call space%take(max(self%n_a, self%n_b), n_j, columns)
+    call room_to_solve(n_j, space)
     line_info = line_not_finite
     rcond = 0.0_dp
     if (space%only_counts) return
     if (.not. (all_finite(self%h_a(:, :, i)) .and. all_finite(self%h_b(:, :, i)) &
                .and. all_finite(self%k_joint(:, :, i)))) return
-    call load(self%transposed, self%h_a(:, :, i), h_a)
-    call load(self%transposed, self%h_b(:, :, i), h_b)
-    call load(self%transposed, self%k_joint(:, :, i), m%d)
-    call take_relative(h_a, h_b, self%dofs_a, self%dofs_b, m%h, m%columns, m%rows, m%h_mm)
-    call apply_modification(m, space, line_info, rcond)                 ! (2.26)
-    call store(self%transposed, m%h, self%result(:, :, i))
+    call load(self%transposed, self%k_joint(:, :, i), k_joint)
+    call take_rows(self%transposed, self%h_a(:, :, i), self%dofs_a, rows(:, :self%n_a))
+    call take_rows(self%transposed, self%h_b(:, :, i), self%dofs_b, rows(:, self%n_a + 1:))
+    call add_squares(self%n_a, rows, self%dofs_a, self%dofs_b, h_relative)
+    call find_line_forces(k_joint, h_relative, rows, system, forces, space, line_info, rcond)
+    if (line_info /= line_good) return
+    call store(self%transposed, forces, stored)
+    call join(self%transposed, self%n_a, self%n_b, n_j, self%h_a(:, :, i), self%h_b(:, :, i), self%dofs_a, self%dofs_b, &
+              stored, columns, self%result(:, :, i))                                                           ! (2.26)
+    if (.not. all_finite(self%result(:, :, i))) line_info = line_overflow
   end subroutine couple_one
 
-  !> Receptance of the unjoined substructures, and its columns, rows and square in the coordinates x_j - x_k.
-  pure subroutine take_relative(h_a, h_b, dofs_a, dofs_b, h, columns, rows, h_relative)
-    complex(dp), contiguous, intent(in) :: h_a(:, :), h_b(:, :)
-    integer(ip), contiguous, intent(in) :: dofs_a(:), dofs_b(:)
-    complex(dp), contiguous, intent(out) :: h(:, :), columns(:, :), rows(:, :), h_relative(:, :)
-    integer :: n_a
+  !> Some rows of a matrix that lies as the caller stores it.
+  pure subroutine take_rows(transposed, h, dofs, rows)
+    logical, intent(in) :: transposed
+    complex(dp), contiguous, intent(in) :: h(:, :)
+    integer(ip), contiguous, intent(in) :: dofs(:)
+    complex(dp), contiguous, intent(out) :: rows(:, :)
+    integer :: i, j
 
-    n_a = size(h_a, 1)
-    h = 0
-    h(:n_a, :n_a) = h_a
-    h(n_a + 1:, n_a + 1:) = h_b
-    columns(:n_a, :) = h_a(:, dofs_a)
-    columns(n_a + 1:, :) = -h_b(:, dofs_b)
-    rows(:, :n_a) = h_a(dofs_a, :)
-    rows(:, n_a + 1:) = -h_b(dofs_b, :)
-    h_relative = h_a(dofs_a, dofs_a) + h_b(dofs_b, dofs_b)
-  end subroutine take_relative
+    if (transposed) then
+      do i = 1, size(dofs)
+        rows(i, :) = h(:, dofs(i))
+      end do
+    else
+      do j = 1, size(h, 2)
+        rows(:, j) = h(dofs, j)
+      end do
+    end if
+  end subroutine take_rows
+
+  !> H_jj + H_kk from rows j of H_A beside rows k of H_B.
+  pure subroutine add_squares(n_a, rows, dofs_a, dofs_b, h)
+    integer, intent(in) :: n_a
+    complex(dp), contiguous, intent(in) :: rows(:, :)
+    integer(ip), contiguous, intent(in) :: dofs_a(:), dofs_b(:)
+    complex(dp), contiguous, intent(out) :: h(:, :)
+
+    h = rows(:, dofs_a) + rows(:, n_a + dofs_b)
+  end subroutine add_squares
 
 end module jointfrf_coupling

@@ -23,7 +23,7 @@ module jointfrf_lanes
   integer, parameter, public :: lanes = 8
 
   !> Up to this order there is an inverse of its own for each order; its matrix lies row by row.
-  integer, parameter, public :: largest_constant = 8
+  integer, parameter, public :: largest_constant = 7
   !> Above this order LAPACK line by line is as fast in an inverse, and where large matrices give a small result,
   integer, parameter, public :: largest_in_lanes = 128
   !> and above this one in a solution, and where a large result leaves the caches.

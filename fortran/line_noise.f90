@@ -69,13 +69,35 @@ contains
     do lag = 1, n/4 - 1
       pairs = real(m, dp)*(n - lag)
       if (.not. whole) pairs = max(sum(known(:n - lag, :)*known(lag + 1:, :)), 1.0_dp)
-      rho = sum(real(noise(:n - lag, :))*real(noise(lag + 1:, :)) + aimag(noise(:n - lag, :))*aimag(noise(lag + 1:, :)))
+      rho = 0.0_dp
+      do e = 1, m
+        rho = rho + lagged_product(noise(:n - lag, e), noise(lag + 1:, e))
+      end do
       rho = rho/pairs/power*(1.0_dp - share) + share
       if (rho < significant/sqrt(number)) exit
       total = total + rho*(1.0_dp - real(lag, dp)/n)
     end do
     inflation = max(1.0_dp, 1.0_dp + 2.0_dp*total)
   end subroutine line_correlation
+
+  !> Real part of the sum of conjg(a) b, in four sums, each of which waits for its own last addition only.
+  pure function lagged_product(a, b) result(total)
+    complex(dp), contiguous, intent(in) :: a(:), b(:)
+    real(dp) :: total, part(4)
+    integer :: i, k, whole
+
+    part = 0.0_dp
+    whole = size(a) - mod(size(a), 4)
+    do i = 1, whole, 4
+      do k = 1, 4
+        part(k) = part(k) + (real(a(i + k - 1))*real(b(i + k - 1)) + aimag(a(i + k - 1))*aimag(b(i + k - 1)))
+      end do
+    end do
+    total = sum(part)
+    do i = whole + 1, size(a)
+      total = total + (real(a(i))*real(b(i)) + aimag(a(i))*aimag(b(i)))
+    end do
+  end function lagged_product
 
   !> Cut the noise of an entry to some medians of its size, and put 0 in place of NaN.
   !> known   1 where there is noise, 0 where there was NaN

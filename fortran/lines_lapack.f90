@@ -2,7 +2,7 @@
 module jointfrf_lines_lapack
   use, intrinsic :: iso_c_binding, only: c_size_t
   use jointfrf_kinds, only: blas_ip, dp, ip, long
-  use jointfrf_lapack, only: zgecon, zgemm, zgesv, zgetrf, zgetri
+  use jointfrf_lapack, only: zgecon, zgemm, zgesv, zgetrf, zgetri, zgetrs
   use jointfrf_line_layout, only: all_finite
   use jointfrf_status, only: line_good, line_overflow
   use jointfrf_sweep, only: line_space
@@ -16,6 +16,8 @@ module jointfrf_lines_lapack
   integer, parameter :: inverse_block = 32
   !> Up to this order the condition number comes from the inverse itself, which costs a third of an estimate by zgecon.
   integer, parameter :: exact_condition = 32
+  !> A solution that says that the reciprocal condition number is larger is believed: it may be too large by a factor of 30.
+  real(dp), parameter :: well_conditioned = 1.0e-8_dp
   !> A matrix of a larger norm is scaled, by a power of two: |z|^2 and sums of products overflow in LAPACK.
   real(dp), parameter :: large = 2.0_dp**900
   !> One of a smaller norm is scaled, too: reciprocals of its pivots, and squares of them, are beyond all numbers.
@@ -78,7 +80,8 @@ contains
     if (.not. all_finite(b)) info = line_overflow
   end subroutine solve_line
 
-  !> Reciprocal condition number from LU factors: of the inverse while that is cheap, else LAPACK's estimate.
+  !> Reciprocal condition number from LU factors: of the inverse while that is cheap, else LAPACK's estimate; where an
+  !> estimate will do and it is large, by one solution.
   subroutine condition(norm, factors, pivot, space, rcond)
     real(dp), intent(in) :: norm
     complex(dp), contiguous, intent(in) :: factors(:, :)
@@ -93,16 +96,42 @@ contains
     n = size(factors, 1, kind=blas_ip)
     before = space%used
     call take_for_condition(int(n), space, inverse, work, real_work)
-    if (n <= exact_condition) then
+    rcond = 0.0_dp
+    if (space%estimates) call condition_by_solution(norm, factors, pivot, work(:, 1), rcond)
+    if (rcond <= well_conditioned .and. n <= exact_condition) then
       inverse = factors
       call zgetri(n, inverse, n, pivot, work, size(work, kind=blas_ip), ignored)
       rcond = 0.0_dp
       if (all_finite(inverse)) rcond = min(1.0_dp, (1.0_dp/norm)/one_norm(inverse))
-    else
+    else if (rcond <= well_conditioned) then
       call zgecon('1', n, factors, n, norm, rcond, work, real_work, ignored, one_char)
     end if
     space%used = before
   end subroutine condition
+
+  !> From the largest unknown of A^T x = b, where the numbers of b have modulus 1 at angles that no symmetry shares: a
+  !> column of A^-1 of n numbers of like size adds up to about sqrt(n) of them in x, and to n in the norm.
+  subroutine condition_by_solution(norm, factors, pivot, x, rcond)
+    real(dp), intent(in) :: norm
+    complex(dp), contiguous, intent(in) :: factors(:, :)
+    integer(blas_ip), contiguous, intent(in) :: pivot(:)
+    complex(dp), contiguous, intent(out) :: x(:)
+    real(dp), intent(out) :: rcond
+    real(dp), parameter :: angle = 2.39996322972865332_dp      ! the golden angle
+    complex(dp), parameter :: turn = cmplx(cos(angle), sin(angle), dp)
+    integer(blas_ip) :: n, ignored
+    integer :: i
+
+    n = size(x, kind=blas_ip)
+    x(1) = turn
+    do i = 2, size(x)
+      x(i) = turn*x(i - 1)
+    end do
+    call zgetrs('T', n, 1_blas_ip, factors, n, pivot, x, n, ignored, one_char)
+    rcond = 0.0_dp
+    if (.not. sum(abs(real(x, dp)) + abs(aimag(x))) <= huge(1.0_dp)) return
+    rcond = min(1.0_dp, (1.0_dp/norm)/(sqrt(real(n, dp))*maxval(abs(real(x, dp)) + abs(aimag(x)))))
+  end subroutine condition_by_solution
 
   !> What `condition` works in for a matrix of order n; null where it does not need it.
   subroutine take_for_condition(n, space, inverse, work, real_work)

@@ -13,7 +13,7 @@ module jointfrf_modification
   implicit none
   private
   public :: modify, find_modification
-  public :: modification_matrices, take_matrices, apply_modification
+  public :: find_line_forces
   public :: modification_in_lanes, plan_modification, apply_in_lanes
   public :: forces_in_lanes, plan_forces, find_forces
 
@@ -299,20 +299,31 @@ contains
     type(line_space), target, intent(inout) :: space
     integer(ip), intent(out) :: line_info
     real(dp), intent(out) :: rcond
-    integer :: k
 
-    m%system = 0
-    do k = 1, size(m%d, 1)
-      m%system(k, k) = 1
-    end do
-    call product_line('N', 'N', 1.0_dp, m%d, m%h_mm, m%system)
-    m%forces = 0
-    call product_line('N', 'N', 1.0_dp, m%d, m%rows, m%forces)
-    call solve_line(m%system, m%forces, space, line_info, rcond)
+    call find_line_forces(m%d, m%h_mm, m%rows, m%system, m%forces, space, line_info, rcond)
     if (line_info /= line_good) return
     call product_line('N', 'N', -1.0_dp, m%columns, m%forces, m%h)
     if (.not. all_finite(m%h)) line_info = line_overflow
   end subroutine apply_modification
+
+  !> (I + D H_mm)^-1 D rows with LAPACK; the arguments are described in `modification_matrices`.
+  subroutine find_line_forces(d, h_mm, rows, system, forces, space, line_info, rcond)
+    complex(dp), contiguous, intent(in) :: d(:, :), h_mm(:, :), rows(:, :)
+    complex(dp), contiguous, intent(inout) :: system(:, :), forces(:, :)
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info
+    real(dp), intent(out) :: rcond
+    integer :: k
+
+    system = 0
+    do k = 1, size(d, 1)
+      system(k, k) = 1
+    end do
+    call product_line('N', 'N', 1.0_dp, d, h_mm, system)
+    forces = 0
+    call product_line('N', 'N', 1.0_dp, d, rows, forces)
+    call solve_line(system, forces, space, line_info, rcond)
+  end subroutine find_line_forces
 
   !> The modification D = alpha^-1 (alpha - gamma) gamma^-1 between two structures. Eqs. (2.40), (2.47).
   !> The product form keeps its accuracy for a weak modification, where gamma^-1 - alpha^-1 cancels.

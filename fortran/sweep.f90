@@ -52,6 +52,7 @@ module jointfrf_sweep
   !> `set_up` can provide it.
   type :: line_space
     logical :: only_counts = .true.          !< what is taken is null
+    logical :: estimates = .false.           !< condition of what is solved: an estimate will do, as in lanes
     type(extent) :: most                     !< the most that was taken at a time
     integer(long) :: used = 0                !< complex numbers taken
     complex(dp), pointer, contiguous :: z(:) => null()
@@ -326,12 +327,12 @@ contains
     type(sweep_work) :: work
     integer(long) :: n_shares
     integer :: threads, stat
-    logical :: hold
+    logical :: hold, in_lanes
 
-    call find_kernels(work%kernels, work%blocks, info)
+    call find_kernels(work%kernels, in_lanes, info)
     if (info /= info_good) return
     work%operation => operation
-    work%blocks = work%blocks .and. operation%n_element > 0 .and. n_freq >= fewest_lines
+    work%blocks = in_lanes .and. operation%n_element > 0 .and. n_freq >= fewest_lines
     if (work%blocks) work%lines = lines_of_share(operation)
     n_shares = (n_freq - 1)/work%lines + 1
     threads = threads_for(operation%flops*n_freq, n_shares, merge(serial_flops_lanes, serial_flops, work%blocks))
@@ -342,6 +343,7 @@ contains
       info = info_no_memory
       return
     end if
+    space%estimates = in_lanes
     work%space => space
     work%line_info => line_info
     work%rcond => rcond

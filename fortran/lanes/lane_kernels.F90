@@ -104,12 +104,6 @@ contains
 #include "constant_order.inc"
 #undef JF_ORDER
 #undef JF_INVERT
-#define JF_ORDER 8
-#define JF_INVERT invert_order_8
-#include "own_inverse.inc"
-#include "constant_order.inc"
-#undef JF_ORDER
-#undef JF_INVERT
 #include "solution.inc"
 #include "small_solution.inc"
 #define JF_ORDER 3

@@ -10,7 +10,8 @@ module jointfrf_lapack
   use jointfrf_kinds, only: blas_ip, dp
   implicit none
   private
-  public :: dgemm, dposv, dsyev, zgeev, zgesv, zgetrf, zgetri, zgecon, zgbtrf, zgbtrs, zgbcon, zgemm, zgemv
+  public :: dgemm, dposv, dsyev, zgeev, zgesv, zgetrf, zgetri, zgetrs, zgecon, zgbtrf, zgbtrs, zgbcon, zgemm, &
+    zgemv
 
   interface
     !> Solve A X = B of a positive definite A by Cholesky's factors.
@@ -54,6 +55,18 @@ module jointfrf_lapack
       complex(dp), intent(inout) :: a(lda, *)
       integer(blas_ip), intent(out) :: ipiv(*), info
     end subroutine zgetrf
+
+    !> Solve op(A) X = B with LU factors.
+    subroutine zgetrs(trans, n, nrhs, a, lda, ipiv, b, ldb, info, trans_len) bind(C, name=JF_BLAS_PREFIX//"zgetrs_")
+      import :: blas_ip, c_char, c_size_t, dp
+      implicit none
+      character(kind=c_char), intent(in) :: trans
+      integer(blas_ip), intent(in) :: n, nrhs, lda, ldb, ipiv(*)
+      complex(dp), intent(in) :: a(lda, *)
+      complex(dp), intent(inout) :: b(ldb, *)
+      integer(blas_ip), intent(out) :: info
+      integer(c_size_t), value :: trans_len
+    end subroutine zgetrs
 
     !> Inverse from LU factors.
     subroutine zgetri(n, a, lda, ipiv, work, lwork, info) bind(C, name=JF_BLAS_PREFIX//"zgetri_")

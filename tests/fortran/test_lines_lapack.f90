@@ -67,6 +67,11 @@ contains
     call check(info == 0 .and. space%used == 3, 'solve: good, workspace given back')
     call check_close(x, b, tolerance, 'solve')
     call check(rcond >= 0.999_dp*exact .and. rcond <= 4.0_dp*exact, 'solve: rcond')
+    lu = a
+    space%estimates = .true.
+    call solve_line(lu(:, :, 1), x(:, :, 1), space, info, rcond)
+    space%estimates = .false.
+    call check(rcond >= exact/30.0_dp .and. rcond <= 30.0_dp*exact, 'solve: estimated rcond')
 
     lu = a
     call invert_line(lu(:, :, 1), space, info, rcond)
@@ -121,6 +126,14 @@ contains
     call solve_line(a, x, space, info, rcond)
     call check(info == 0, 'solve: nearly singular is good')
     call check_close(rcond, 1.0e-12_dp, 1.0e-10_dp, 'solve: rcond, nearly singular')
+    a = 0
+    a(1, 1) = 1
+    a(2, 2) = 1.0e-12_dp
+    a(3, 3) = (0.0_dp, 1.0_dp)
+    space%estimates = .true.
+    call solve_line(a, x, space, info, rcond)
+    space%estimates = .false.
+    call check_close(rcond, 1.0e-12_dp, 1.0e-10_dp, 'solve: rcond, nearly singular, is no estimate')
     a = 0
     a(1, 1) = 1
     a(2, 2) = 1.0e-12_dp

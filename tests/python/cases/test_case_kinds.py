@@ -134,7 +134,7 @@ def folder(tmp_path):
 def test_a_kind_of_ones_own_goes_through_the_same_door(folder, tmp_path):
     reported = []
     workers = Workers(progress=lambda done, total: reported.append((done, total)))
-    output = run_case(folder, tmp_path / "out", workers=workers, kinds={**KINDS, "oscillator": OSCILLATOR})
+    output = run_case(folder, tmp_path / "out", png=True, workers=workers, kinds={**KINDS, "oscillator": OSCILLATOR})
     assert (output.case.mass, output.case.expected, output.case.realisations) == (2.0, 490.0, 40)
     assert output.result.stiffness == pytest.approx(500, rel=0.01)
     assert reported == [(i + 1, 40) for i in range(40)]

@@ -557,6 +557,21 @@ def test_files_of_a_case(tmp_path, without_pictures):
     assert not [path.name for path in folder.rglob(".*")]
 
 
+@pytest.mark.parametrize(("options", "count"), [
+    ({"at_most": 3}, 3), ({"realisations": 2, "at_most": 3}, 2), ({"realisations": 4, "at_most": 3}, 3),
+])  # fmt: skip
+def test_realisations_are_limited(tmp_path, without_pictures, options, count):
+    output = run_case(coarse(tmp_path / "mine"), tmp_path / "out", **options)
+    assert json.loads((output.report.parent / "results.json").read_text())["realisations"] == count
+    assert len(output.result.identified[0].theta) == count
+    assert f"{count} realisations of each noise level" in output.report.read_text()
+
+
+def test_the_limit_of_realisations_is_positive(tmp_path):
+    with pytest.raises(ValueError, match="at_most must be at least 1, not 0"):
+        run_case(find_case("3.1"), tmp_path, at_most=0)
+
+
 def test_a_case_of_ones_own_without_expected_numbers(tmp_path, without_pictures):
     own = coarse(tmp_path / "mine")
     (own / "expected.toml").unlink()

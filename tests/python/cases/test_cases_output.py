@@ -67,7 +67,7 @@ def ran(tmp_path_factory):
         outputs[case.name] = run_case(case, *arguments, **options)
         return outputs[case.name]
 
-    words = (chain, beams, wrong, behind, "--realisations", "4", "--jobs", "2", "--out", folder)
+    words = (chain, beams, wrong, behind, "--realisations", "4", "--jobs", "2", "--png", "--out", folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("jointfrf.workbench.cli.run.run_case", kept)
         patch.setattr("jointfrf.workbench.cases.catalogue.draw", DrawSome(DRAWN))
@@ -224,7 +224,7 @@ def test_cases_of_one_command_are_told_in_their_order(ran):
 def test_tables_are_told_before_figures_are_drawn(tmp_path, monkeypatch):
     shown = []
 
-    def stopped(figure):
+    def stopped(figure, png):
         raise RuntimeError(f"{len(shown)} shown")
 
     monkeypatch.setattr("jointfrf.workbench.cases.catalogue.draw", stopped)

@@ -138,3 +138,6 @@ def test_figures_of_a_fit_hold_lines_fit_and_interval(fit):
     assert drawn.png.startswith(b"\x89PNG")
     assert drawn.svg.startswith(b"<svg")
     assert drawn == draw(figures["joint_theta"])
+    alone = draw(figures["joint_theta"], png=False)
+    assert alone.png == b""
+    assert alone.svg.count(b"<path") == drawn.svg.count(b"<path") > 10

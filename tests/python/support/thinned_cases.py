@@ -35,5 +35,5 @@ class DrawSome:
 
     keys: frozenset[str] = frozenset()
 
-    def __call__(self, figure: Figure) -> Drawing:
-        return draw(figure) if figure.key in self.keys else Drawing(b"", b"<svg/>")
+    def __call__(self, figure: Figure, png: bool = True) -> Drawing:
+        return draw(figure, png) if figure.key in self.keys else Drawing(b"", b"<svg/>")

@@ -244,7 +244,9 @@ class InterfaceFrfs(NamedTuple):
             of_channels = np.triu(of_channels)
         g = of_channels.reshape(len(p), -1)
         own = variance.reshape(len(variance), -1)
-        dead = ~known.reshape(own.shape) @ (g != 0).T
+        dead = np.zeros((len(own), len(p)), bool)
+        if not whole:
+            dead = (~known.reshape(own.shape)).astype(float) @ (g != 0).T > 0
         total = own @ (g**2).T
         inverse_std = _inverse_root(total, dead)
         whitening = np.zeros((len(own), len(p), len(p)))
@@ -357,8 +359,12 @@ def _blocks(g: FloatArray) -> list[NDArray[np.intp]]:
 def _whitening(g: FloatArray, variance: FloatArray, inverse_std: FloatArray, dead: NDArray[np.bool_]) -> FloatArray:
     """Return the triangles that whiten entries sum_c G_ic h_c, shape (n_freq, q, q)."""
     seen = np.flatnonzero(g.any(axis=0))
-    scaled_g = inverse_std[:, :, None] * g[:, seen]
-    return _triangles((scaled_g * variance[:, None, seen]) @ scaled_g.swapaxes(1, 2), dead)
+    # All lines in one product: the entries are few, so that each pair of them has its row.
+    pairs = (g[:, None, seen] * g[:, seen]).reshape(-1, seen.size)
+    covariance = (variance[:, seen] @ pairs.T).reshape(-1, len(g), len(g))
+    covariance *= inverse_std[:, :, None]
+    covariance *= inverse_std[:, None, :]
+    return _triangles(covariance, dead)
 
 
 def _triangles(covariance: FloatArray, dead: NDArray[np.bool_]) -> FloatArray:

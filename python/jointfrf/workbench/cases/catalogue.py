@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -88,7 +89,7 @@ class CaseOutput:
     summary : list of Table
         What came out, in short.
     report : Path
-        The HTML report; CSV, PNG, SVG and JSON files are beside it.
+        The HTML report; CSV, SVG and JSON files are beside it.
     printed : list of Table
         The tables that are worth printing.
     """
@@ -252,6 +253,8 @@ def run_case(
     out: Path | str = "results",
     *,
     realisations: int | None = None,
+    at_most: int | None = None,
+    png: bool = False,
     workers: Workers | None = None,
     kinds: Mapping[str, CaseKind[Any, Any]] = KINDS,
     show: Callable[[Case, list[Table]], None] = lambda case, tables: None,
@@ -264,9 +267,13 @@ def run_case(
         Folder with `case.toml`.
     out : Path or str
         Results go to a folder with the case's name in there: `report.html`, `results.json`, `tables/*.csv`,
-        `figures/*.png`, `figures/*.svg` and `figures/*.csv`.
+        `figures/*.svg` and `figures/*.csv`.
     realisations : int, optional
-        Instead of the number that the case names.
+        Number of realisations, default the number that the case names.
+    at_most : int, optional
+        Largest number of realisations.
+    png : bool
+        Whether to write `figures/*.png`, too.
     workers : Workers, optional
         Processes that share the work, see `jointfrf.workbench.cases.workers.started_workers`; this process by default.
     kinds : mapping of str to CaseKind
@@ -285,24 +292,26 @@ def run_case(
     OSError
         The results cannot be written.
     """
-    if realisations is not None and realisations < 1:
-        raise ValueError(f"realisations must be at least 1, not {realisations}")
+    for name, number in (("realisations", realisations), ("at_most", at_most)):
+        if number is not None and number < 1:
+            raise ValueError(f"{name} must be at least 1, not {number}")
     at_work = workers or Workers()
     case, kind = read_case_and_kind(Path(folder), kinds)
+    count = case.realisations if realisations is None else realisations
+    count = min(count, at_most or count)
     if realisations is None:
         stated = f"{case.folder / 'case.toml'}: realisations = {case.realisations}"
-        check_stated(stated, _REALISATION * case.realisations)
+        check_stated(stated, _REALISATION * count)
     target = OwnFolder(Path(out)) / case.name
     for inner in ("tables", "figures"):
         (target / inner).make()
-    count = case.realisations if realisations is None else realisations
     result = kind.compute(case, count, at_work)
     tables = kind.tables(result)
     summary = kind.summary(result, tables)
     printed = [table for table in tables if table.key not in kind.not_printed]
     show(case, [*summary, *printed])
     figures = numbered(case, kind.figures(result))
-    drawn = at_work.map(draw, figures)
+    drawn = at_work.map(partial(draw, png=png), figures)
     content = _common_numbers(case, count, tables) | kind.numbers(result)
     page = Page(
         title=case.title,
@@ -330,8 +339,9 @@ def write_results(
     """Write a page and, beside it, its tables, figures and numbers; return the path of the page."""
     drawings, numbers = (folder / "figures").make(), (folder / "tables").make()
     for figure, drawing in figures:
-        for suffix, held in ((".png", drawing.png), (".svg", drawing.svg), (".csv", figure_csv(figure))):
-            drawings.write(clean_name(figure.key, suffix), held)
+        for suffix, content_of in ((".png", drawing.png), (".svg", drawing.svg), (".csv", figure_csv(figure))):
+            if content_of:
+                drawings.write(clean_name(figure.key, suffix), content_of)
     for table in tables:
         numbers.write(clean_name(table.key, ".csv"), table_csv(table))
     folder.write("results.json", json.dumps(content, indent=1) + "\n")

@@ -123,8 +123,8 @@ def _run_one(folder: Path, options: argparse.Namespace, workers: Workers, say: C
     """Run a case: its tables are printed before its figures are drawn."""
     start = time.perf_counter()
     output = run_case(
-        folder, options.out, realisations=options.realisations, workers=workers,
-        show=lambda case, tables: say("\n".join(_shown(case, tables))),
+        folder, options.out, realisations=options.realisations, at_most=options.at_most, png=options.png,
+        workers=workers, show=lambda case, tables: say("\n".join(_shown(case, tables))),
     )  # fmt: skip
     say(f"{time.perf_counter() - start:.1f} s, report: {output.report}\n")
     return output.report

@@ -17,4 +17,6 @@ def add_arguments(parser: CommandParser) -> None:
     parser.add_argument("cases", nargs="*", metavar="CASE", help="name, number, or folder with a case.toml")
     parser.option("--out DIR", "folder for the results", Path, Path("results"))
     parser.option("--realisations N", "number of realisations", positive, otherwise="the number in the case")
+    parser.option("--at-most N", "largest number of realisations of a case", positive)
+    parser.option("--png", "write figures as PNG files, too")
     parser.option("--jobs N", "number of processes", positive, otherwise="all cores")
