@@ -25,6 +25,7 @@ include_patterns = [
     "docs/generated/**",
     "cases/*/README.md",
     "fortran/README.md",
+    "python/packaging/README.md",
     "README.md",
     "CHANGELOG.md",
     "CONTRIBUTING.md",

@@ -71,6 +71,7 @@ _SECTIONS = {
         "CONTRIBUTING.md",
         "CODE_OF_CONDUCT.md",
         "fortran/README.md",
+        "python/packaging/README.md",
         "SECURITY.md",
         "CHANGELOG.md",
         "tests/benchmarks/history.md",

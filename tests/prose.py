@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 STORED = ROOT / "tests" / "prose.toml"
-DOCUMENTS = ("*.md", "docs/*.md", "fortran/README.md", "cases/*/README.md")
+DOCUMENTS = ("*.md", "docs/*.md", "fortran/README.md", "python/packaging/README.md", "cases/*/README.md")
 PACKAGE = "python/jointfrf"
 #: Departures per 1000 words on a page that has no stored count.
 TARGET = 6

@@ -16,11 +16,10 @@ from textwrap import dedent
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[3]
+PAGES = ("*.md", "docs/*.md", "cases/*/README.md", "fortran/README.md", "python/packaging/README.md")
 DOCUMENTS = {
     str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
-    for path in sorted(
-        [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("cases/*/README.md"), ROOT / "fortran/README.md"]
-    )
+    for path in sorted([path for pattern in PAGES for path in ROOT.glob(pattern)])
 }
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
