@@ -42,6 +42,7 @@ _SECTIONS = {
     "How to": [
         "docs/measured-file.md",
         "docs/checks.md",
+        "docs/common-problems.md",
         "docs/model-fit.md",
         "docs/sides.md",
         "docs/levels.md",
@@ -61,6 +62,7 @@ _SECTIONS = {
         "docs/generated/fortran.md",
         "docs/command-line.md",
         "docs/messages.md",
+        "docs/glossary.md",
         "docs/files.md",
         "docs/assembly-keys.md",
         "docs/case-keys.md",
