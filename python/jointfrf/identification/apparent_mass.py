@@ -20,8 +20,10 @@ __all__ = ["ApparentMass", "ApparentScale", "StaticCompliance", "apparent_scale"
 
 #: Lines of the first fit, and by how much each next one has more.
 _FIRST, _GROWTH = 8, 1.25
-#: Significance of the test whether a fit leaves noise, and standard deviations of a 95 % interval.
-_CHANCE, _REACH = 0.05, 1.96
+#: Chance of larger squares below which lines are not on the mass line, and above which their series is taken.
+_UNFIT, _FIT = 1e-3, 0.05
+#: Standard deviations of a 95 % interval.
+_REACH = 1.96
 #: Relative standard error above which a number is not stated, and share of the next term of the series at the lowest
 #: line above which this line is not on the mass line, or not static.
 _KNOWN = 0.2
@@ -244,11 +246,16 @@ def _compliances(
 def _series(omega: FloatArray, y: FloatArray, std: FloatArray) -> tuple[FloatArray, FloatArray, int] | None:
     """Fit a series in w^2 to the lowest lines; return terms, standard errors, and the last line.
 
-    As many lines are used as three terms fit within the noise; one more term takes up what three have missed there.
+    As many lines are used as three terms clearly fit; one more term takes up what three have missed there.
     """
     count, last = _FIRST, None
-    while count <= omega.size and _least_squares(omega[:count], y[:count], std[:count], 3)[2] > _CHANCE:
-        last, count = count, max(count + 1, int(count * _GROWTH))
+    while count <= omega.size:
+        chance = _least_squares(omega[:count], y[:count], std[:count], 3)[2]
+        if not chance > _UNFIT:
+            break
+        if chance > _FIT or last is None:
+            last = count
+        count = max(count + 1, int(count * _GROWTH))
     if last is None:
         return None
     terms, errors, _ = _least_squares(omega[:last], y[:last], std[:last], 4)

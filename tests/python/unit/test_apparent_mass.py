@@ -150,3 +150,11 @@ def test_a_stated_mass_is_compared(files, command):
         2,
         "jointfrf: error: --mass must be positive, not 0; state it in kg\n",
     )
+
+
+def test_a_stated_mass_that_the_lines_do_not_show_is_not_passed_over(files):
+    """Above the mass line no mass is found."""
+    joint = ["--j", "1", "--k", "2", "--dofs", "x", "--mass", "17"]
+    result = run_command("check", files[0], *joint, "--band", f"{FREQ_HZ[-1] / 2:g}:{FREQ_HZ[-1]:g}")
+    assert result.returncode == 1
+    assert "warning: --mass was not compared: the lowest lines do not show this mass to 20 %" in result.stdout

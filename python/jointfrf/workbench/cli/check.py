@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
         warned = [*joint.warnings(check)]
         check_stated(args)
         scale = scale_of_joint(joint)
-        check_masses(args, scale)
+        warned += check_masses(args, scale)
         out.say(*joint.text(), *scale.text(), *(f"warning: {text}" for text in warned))
         out.warn(*warned)
     else:

@@ -84,9 +84,9 @@ def run(args: argparse.Namespace) -> int:
                 fit = _fit(args, method, frfs, joint, laws, tuple(side.model for side in sides))
                 fits.append(fit.with_findings_of_data(check.findings))
             scale = scale_of_fit(fits[-1])
-            check_masses(args, scale, sides)
-            out.say("", fits[-1], *scale.text())
-            out.warn(*fits[-1].warnings)
+            unknown = check_masses(args, scale, sides)
+            out.say("", fits[-1], *scale.text(), *(f"warning: {text}" for text in unknown))
+            out.warn(*fits[-1].warnings, *unknown)
     with waiting("results"):
         text, written = _write_results(args, frfs, joint, fits, request)
     if text and args.output is None:

@@ -24,8 +24,10 @@ __all__ = ["check_masses", "check_stated", "scale_of_fit", "scale_of_joint"]
 
 #: Options of stated masses, and the sides that they are of.
 _OPTIONS = {"mass_j": "j", "mass_k": "k", "mass": "j and k"}
+#: Percent to which a mass must be known.
+_KNOWN_PERCENT = 20
 #: Lines of a look: those on the mass line are the lowest.
-_LINES = 400
+_LINES = 1000
 
 
 def check_stated(args: argparse.Namespace) -> None:
@@ -70,8 +72,13 @@ def _scale(
     return apparent_scale(freq[used], gamma, spread, dofs)
 
 
-def check_masses(args: argparse.Namespace, scale: ApparentScale, sides: Sequence[SidePart] = ()) -> None:
+def check_masses(args: argparse.Namespace, scale: ApparentScale, sides: Sequence[SidePart] = ()) -> list[str]:
     """Raise an error for a mass, stated by an option or by the model of a side, that the FRFs contradict.
+
+    Returns
+    -------
+    list of str
+        A sentence for each option that the FRFs can neither confirm nor contradict.
 
     Raises
     ------
@@ -86,3 +93,8 @@ def check_masses(args: argparse.Namespace, scale: ApparentScale, sides: Sequence
         wrong = None if value is None else scale.contradiction(side, value)
         if wrong is not None:
             raise FileContentError(f"{wrong}: correct the unit of the FRFs, or {name}")
+    return [
+        f"--{name.replace('_', '-')} was not compared: the lowest lines do not show this mass to {_KNOWN_PERCENT} %"
+        for name, side in _OPTIONS.items()
+        if getattr(args, name) is not None and scale.of_side(side) is None
+    ]
