@@ -384,8 +384,8 @@ contains
     call find_line_forces(k_joint, h_relative, rows, system, forces, space, line_info, rcond)
     if (line_info /= line_good) return
     call store(self%transposed, forces, stored)
-    call join(self%transposed, self%n_a, self%n_b, n_j, self%h_a(:, :, i), self%h_b(:, :, i), self%dofs_a, self%dofs_b, &
-              stored, columns, self%result(:, :, i))                                                           ! (2.26)
+    call join(self%transposed, self%n_a, self%n_b, n_j, self%h_a(:, :, i), self%h_b(:, :, i), self%dofs_a, &
+              self%dofs_b, stored, columns, self%result(:, :, i))                                               ! (2.26)
     if (.not. all_finite(self%result(:, :, i))) line_info = line_overflow
   end subroutine couple_one
 

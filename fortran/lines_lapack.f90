@@ -16,7 +16,7 @@ module jointfrf_lines_lapack
   integer, parameter :: inverse_block = 32
   !> Up to this order the condition number comes from the inverse itself, which costs a third of an estimate by zgecon.
   integer, parameter :: exact_condition = 32
-  !> A solution that says that the reciprocal condition number is larger is believed: it may be too large by a factor of 30.
+  !> An estimated reciprocal condition number above this is taken: it may be too large by a factor of 30.
   real(dp), parameter :: well_conditioned = 1.0e-8_dp
   !> A matrix of a larger norm is scaled, by a power of two: |z|^2 and sums of products overflow in LAPACK.
   real(dp), parameter :: large = 2.0_dp**900

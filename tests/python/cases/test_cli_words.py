@@ -390,7 +390,7 @@ def test_what_an_option_needs_is_checked_before_the_work(monkeypatch, package, w
 def test_paths_through_a_link_mean_what_the_system_means(tmp_path, monkeypatch):
     """link/.. is the folder above that of the link's target, not the one that holds the link."""
     for module in ("report.fit", "studies.result"):
-        monkeypatch.setattr(f"jointfrf.{module}.draw", DrawSome())
+        monkeypatch.setattr(f"jointfrf.workbench.{module}.draw", DrawSome())
     (tmp_path / "real" / "deep").mkdir(parents=True)
     (tmp_path / "link").symlink_to(Path("real") / "deep")
     words = ["--out", "link/../out", "--save", "link/../new.json", "--report", "link/../page/r.html"]

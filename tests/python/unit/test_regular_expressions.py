@@ -8,6 +8,7 @@ import pytest
 
 from jointfrf.errors import FileContentError
 from jointfrf.io import read_channel_table, read_frfs
+from packages import package_of
 from regular_expressions import Expression, expressions, seconds, slowest
 from uff_writer import function, nodes_2411, units
 
@@ -54,9 +55,9 @@ def test_slow_expressions_are_found(pattern):
 
 
 def test_all_expressions_are_found():
-    """As many as the sources have, in all the rooms that have some."""
-    rooms = {one.where.split(",")[0].split(".")[1] for one in EXPRESSIONS}
-    assert {"io", "frf", "cli", "report", "files"} <= rooms
+    """As many as the sources have, in all packages that have some."""
+    found = {package_of(one.where.split(",")[0]) for one in EXPRESSIONS}
+    assert {"io", "frf", "files", "workbench.cli", "workbench.report"} <= found
     assert len(EXPRESSIONS) > 40
 
 
