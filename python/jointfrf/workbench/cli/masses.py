@@ -78,7 +78,7 @@ def check_masses(args: argparse.Namespace, scale: ApparentScale, sides: Sequence
     Returns
     -------
     list of str
-        A sentence for each option that the FRFs can neither confirm nor contradict.
+        A sentence for each option that the FRFs cannot confirm or contradict.
 
     Raises
     ------
