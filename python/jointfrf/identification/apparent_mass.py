@@ -16,7 +16,15 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.models.model import Model
 
-__all__ = ["ApparentMass", "ApparentScale", "StaticCompliance", "apparent_scale", "common_factor", "model_mass"]
+__all__ = [
+    "KNOWN",
+    "ApparentMass",
+    "ApparentScale",
+    "StaticCompliance",
+    "apparent_scale",
+    "common_factor",
+    "model_mass",
+]
 
 #: Lines of the first fit, and by how much each next one has more.
 _FIRST, _GROWTH = 8, 1.25
@@ -26,7 +34,7 @@ _UNFIT, _FIT = 1e-3, 0.05
 _REACH = 1.96
 #: Relative standard error above which a number is not stated, and share of the next term of the series at the lowest
 #: line above which this line is not on the mass line, or not static.
-_KNOWN = 0.2
+KNOWN = 0.2
 #: What a stated mass may be off: sensors, cables, rotations that were not measured.
 _STATED = 0.2
 #: Factors between FRFs in SI units and FRFs in other units, by what was taken for what.
@@ -229,7 +237,7 @@ def _masses(
 
 def _is_known(value: float, error: float, next_term: float = 0.0) -> bool:
     """Whether a number is positive and known, and the next term of its series small at the lowest line."""
-    return max(error, abs(next_term)) < _KNOWN * value
+    return max(error, abs(next_term)) < KNOWN * value
 
 
 def _compliances(

@@ -10,7 +10,7 @@ import numpy as np
 
 from jointfrf.errors import FileContentError
 from jointfrf.frf.noise_model import estimate_noise
-from jointfrf.identification.apparent_mass import ApparentScale, apparent_scale, model_mass
+from jointfrf.identification.apparent_mass import KNOWN, ApparentScale, apparent_scale, model_mass
 from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -24,8 +24,6 @@ __all__ = ["check_masses", "check_stated", "scale_of_fit", "scale_of_joint"]
 
 #: Options of stated masses, and the sides that they are of.
 _OPTIONS = {"mass_j": "j", "mass_k": "k", "mass": "j and k"}
-#: Percent to which a mass must be known.
-_KNOWN_PERCENT = 20
 #: Lines of a look: those on the mass line are the lowest.
 _LINES = 1000
 
@@ -94,7 +92,7 @@ def check_masses(args: argparse.Namespace, scale: ApparentScale, sides: Sequence
         if wrong is not None:
             raise FileContentError(f"{wrong}: correct the unit of the FRFs, or {name}")
     return [
-        f"--{name.replace('_', '-')} was not compared: the lowest lines do not show this mass to {_KNOWN_PERCENT} %"
+        f"--{name.replace('_', '-')} was not compared: the lowest lines do not show this mass to {100 * KNOWN:g} %"
         for name, side in _OPTIONS.items()
         if getattr(args, name) is not None and scale.of_side(side) is None
     ]
