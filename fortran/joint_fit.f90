@@ -9,6 +9,7 @@ module jointfrf_joint_fit
   use jointfrf_blas_threads, only: hold_blas_threads, release_blas_threads
   use jointfrf_diagonal_joint, only: diagonal_joint, fit_diagonal_joint, line_forms, lowest_diagonal_joint, &
     rate_of_one, search_limits, set_limits
+  use jointfrf_gamma_distribution, only: gamma_quantile
   use jointfrf_joint_frfs, only: joint_frfs
   use jointfrf_joint_start, only: find_springs, start_joint
   use jointfrf_kinds, only: blas_ip, dp, ip
@@ -28,8 +29,9 @@ module jointfrf_joint_fit
   integer, parameter :: most = 25, first_steps = 30, next_steps = 8, other_steps = 25
   !> A line has arrived when a step gains less than this of the squares, in units of the noise.
   real(dp), parameter :: arrived = 1.0e-5_dp
-  !> Lines farther from the manifold than this, in squares per unknown and of the noise, are started again.
-  real(dp), parameter :: far = 3.0_dp
+  !> Lines farther from the manifold than this, in squares per unknown and of the noise, are started again. By default
+  !> they are left out beyond this, and beyond the distance that noise reaches on any line with this probability.
+  real(dp), parameter :: far = 3.0_dp, by_chance = 1.0e-3_dp
   !> The fit has converged when the coordinates move by less than this many standard errors, root mean square.
   real(dp), parameter :: moved_least = 0.02_dp
   !> Of a fit that swings between two points, the distance up to which it has converged between them.
@@ -58,7 +60,7 @@ module jointfrf_joint_fit
   !> What is asked.
   type, public :: fit_options
     integer :: patience = 8             !< linearisations after which a fit far from the data ends
-    real(dp) :: farthest = 0.0_dp       !< squares of a line beyond which it is not used; 0 for what is usual
+    real(dp) :: farthest = 0.0_dp       !< squares of a line beyond which it is not used; 0 for the default
     integer :: start = from_nothing     !< what is given
     logical :: flexible = .false.       !< whether the sides may be flexible: lines are started again once only
   end type fit_options
@@ -85,6 +87,7 @@ module jointfrf_joint_fit
     type(minimum) :: trial
     logical, allocatable :: last_used(:), is_far(:)
     real(dp), allocatable :: count(:)                      !< equations of every line
+    real(dp) :: farthest = 0.0_dp                          !< squares of a line beyond which it is not used
     complex(dp), allocatable :: r(:, :, :), point_h(:, :, :), point_q(:, :, :)
     real(dp), allocatable :: spread_m(:, :, :), real_line(:), at(:), change(:), last(:)
     integer(ip), allocatable :: line_info(:)
@@ -166,7 +169,23 @@ contains
     fit%distance(:) = huge(1.0_dp)
     call count_equations(frfs, fit%count)
     fit%possible = sum(fit%count)
+    fit%real_line(:) = fit%count
+    fit%farthest = usual_distance(n, fit%real_line)
   end subroutine prepare
+
+  !> The distance beyond which a line is not used by default.
+  function usual_distance(n, equations) result(farthest)
+    integer, intent(in) :: n
+    real(dp), contiguous, intent(inout) :: equations(:)    !< of every line; reordered
+    real(dp) :: farthest, middle, chance
+
+    farthest = far*real(n, dp)**2
+    if (size(equations) == 0) return
+    call find_median(equations, middle)
+    if (.not. middle > 0.0_dp) return
+    chance = by_chance/real(size(equations), dp)
+    farthest = max(farthest, gamma_quantile(middle, 1.0_dp - chance, chance))
+  end function usual_distance
 
   subroutine allocate_minimum(p, here, stat)
     integer, intent(in) :: p
@@ -263,7 +282,7 @@ contains
       call find_points(frfs, options, fit, info)
       if (info /= info_good) return
       before = count(fit%last_used)
-      call choose_lines(options%farthest, joint%n, fit)
+      call choose_lines(merge(options%farthest, fit%farthest, options%farthest > 0.0_dp), fit)
       ! The joint does not yet take account of lines that come near only now.
       whole = fit%iterations > 1 .and. count(fit%used) <= before
       fit%equations = sum(fit%count, mask=fit%used)
@@ -371,16 +390,15 @@ contains
 
   !> Which lines are near enough to the manifold; half of them where few are. In a long search none comes back.
   !> Few are those that are fewer than the parameters, or than a quarter of all; of so few in all none is left out.
-  subroutine choose_lines(farthest, n, fit)
+  subroutine choose_lines(farthest, fit)
     real(dp), intent(in) :: farthest
-    integer, intent(in) :: n
     type(joint_fit), intent(inout) :: fit
     real(dp) :: middle
     integer :: least, n_freq
 
     n_freq = size(fit%distance)
     least = max(size(fit%at), n_freq/4)
-    fit%used(:) = fit%distance <= merge(farthest, far*real(n, dp)**2, farthest > 0.0_dp)
+    fit%used(:) = fit%distance <= farthest
     if (n_freq <= least) then
       fit%used(:) = .true.
     else if (count(fit%used) < least) then

@@ -1040,7 +1040,8 @@ contains
   !> patience       linearisations after which a fit far from the data ends, for example 8
   !> flexible       1: the sides may be flexible between channels and joint, and no joint need be near all lines; 0:
   !>                they are rigid
-  !> farthest       a line whose distance exceeds this is not used; 0: 3 n^2
+  !> farthest       a line whose distance exceeds this is not used; 0: 3 n^2, or the distance that noise exceeds on any
+  !>                line with probability 0.001 if it is larger
   !> omega          angular frequencies, shape (n_freq), rad/s
   !> smooth         smooth FRFs at DOFs j, then k, shape (n_row, n_column, n_freq), m/N; the measured ones where they
   !>                were not smoothed

@@ -41,6 +41,7 @@ program test_joint_fit
   call rigid_joint()
   call caught_joint()
   call far_lines()
+  call noisy_lines()
   call orders_of_storage(.true.)
   call orders_of_storage(.false.)
   call starts()
@@ -451,6 +452,20 @@ contains
     call check(all(f%distance(3:61:20) > 12.0_dp), 'far lines: distance')
     call check(all(abs(f%gradient(:, 3:61:20)) <= 0.0_dp), 'far lines: forms')
   end subroutine far_lines
+
+  !> With one DOF a line has one equation: noise takes one of twenty beyond three squares, and none is left out.
+  subroutine noisy_lines()
+    type(sample) :: s
+    type(outcome) :: f
+
+    s = make_sample(1, 2, 400, .true., .false., 3.0e-3_dp)
+    s%w(:, :, :) = 1/sqrt(sum(abs(s%measured - s%smooth)**2)/size(s%smooth))
+    s%smooth(:, :, :) = s%measured
+    f = fit(s)
+    call check(f%converged == 1, 'noisy lines: converged')
+    call check(count(f%distance > 3.0_dp) > 4, 'noisy lines: some are beyond three squares')
+    call check(all(f%used == 1), 'noisy lines: all are used')
+  end subroutine noisy_lines
 
   subroutine orders_of_storage(reciprocal)
     logical, intent(in) :: reciprocal
