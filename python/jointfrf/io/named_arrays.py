@@ -244,6 +244,8 @@ def _own_arrays(fields: Mapping[str, Any], where: str) -> FrfArrays:
 def _mapped_arrays(content: Mapping[str, Any], mapping: FrfMapping, where: str, limit: ReadLimit) -> FrfArrays:
     """FRFs by the names of fields."""
     flat = dict(_flattened(content))
+    if not flat:
+        raise FileContentError(f"{where} contains no arrays; give a file of FRFs")
     found = {name: _field(flat, name, getattr(mapping, name), where) for name in _KNOWN}
     times = [path for path in flat if path.rpartition(".")[2].lower() in _TIMES]
     if times and found["h"] is None and not mapping.names_frfs:

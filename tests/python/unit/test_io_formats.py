@@ -1,6 +1,7 @@
 """FRFs come back from every format: as written here, and as other programs write them."""
 
 import re
+import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -431,6 +432,14 @@ def test_arrays_without_names_ask_for_them(tmp_path):
     ways = r"give mapping responses=\.\.\. and mapping excitations=\.\.\., such as 1:x,2:x"
     with pytest.raises(FileContentError, match=rf"\(5 x 3 x 2\) have no names of responses and excitations; {ways}"):
         read_frfs(path)
+
+
+def test_an_archive_without_arrays_is_one_sentence(tmp_path):
+    """A workbook is an archive as well."""
+    with zipfile.ZipFile(tmp_path / "a.xlsx", "w") as archive:
+        archive.writestr("xl/workbook.xml", "<workbook/>")
+    with pytest.raises(FileContentError, match=r"a\.xlsx contains no arrays; give a file of FRFs$"):
+        read_frfs(tmp_path / "a.xlsx")
 
 
 def test_one_frf_that_is_not_finite_leaves_the_others(tmp_path):
