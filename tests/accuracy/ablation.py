@@ -7,6 +7,20 @@
 A mechanism is switched off by replacing one function in all modules of the package. Each row compares with the fit as
 it is, draw by draw: fits that end with an error or do not converge (errors), false intervals without a warning,
 errors of values, widths, seconds.
+
+Mechanisms without an effect in most problems stay, because one kind of test needs each of them:
+
+- level of differences, and measured FRFs where smoothing misses: few lines, and stated noise ten times too small
+  (standard errors of six DOFs would be 3 to 11 times larger);
+- slow variation of noise: noise that changes over frequency;
+- turns of noise and smoothing: lines that are noise only (seven tests of the noise fail without);
+- averages over kinds of damping: few lines with both kinds (case 3.1 with 119 lines would have 65 % for c and 74 % for
+  h, not 95 %);
+- step length: a joint that is stiffer than its flexible sides, and a coupled joint of a hammer test with 42 terms and
+  123 lines, which do not converge without;
+- softer point of linearisation: rigid joints (5 of 100 fits of a joint 1000 times stiffer do not converge without);
+- further initial values: coupled joints of few lines (1 of 12 fits of 42 terms to 30 lines does not converge without);
+- chance of a scatter, residual in the factor: widths change by up to 9 %.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
     tests/accuracy/run assemblies [--only four-mounts] [--draws 100]
 
-Draw number i has the noise of seed i, and mounts of their own.
+Draw number i has the noise of seed i, and mounts that no other draw has. Along z the FRFs of four-mounts contain only
+sums of two mounts: each interval allows for a spread that was estimated from four joints, and is wide.
 """
 
 from __future__ import annotations

@@ -5,6 +5,11 @@
                                                          "models": of fits of models
 
 Draw number i of trial number t, counted from 0 in the order of its table, has the seed [1000 t + i, 30].
+
+Variances from four channels have three degrees of freedom, so that half widths are 2 to 3 times the RMSE. If half of
+the sensors are resonant, one draw of 16 has four resonant sensors by chance, and no difference between channels shows
+it. In such draws of fits with models, errors of the models may explain the FRFs: draws 35 and 57 have a k_y that is
+25 % too high, with warnings of the residual and of the models.
 """
 
 from __future__ import annotations

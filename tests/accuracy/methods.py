@@ -3,7 +3,8 @@
     tests/accuracy/run methods                  cases 3.1, 3.2, 3.3 and 4.3.1, 30 draws each
     tests/accuracy/run methods 3.3 --draws 10
 
-5 % complex noise of each FRF, draw number i with the seed i; lines, points and first bands of the cases.
+5 % complex noise of each FRF; lines, points and first bands of the cases. Draw number i has the seed i, its internal
+FRFs 10 000 + i.
 """
 
 from __future__ import annotations

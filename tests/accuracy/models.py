@@ -5,6 +5,10 @@
     tests/accuracy/run models "exact models" --only right --draws 200
 
 Draw number i of trial number t, counted from 0 in the order of the table, has the seed 1000 t + i.
+
+Ratios and coverages of the table are due to chance, except c_theta of one drive point: its RMSE is 1.16 of the bound in
+800 draws, with the noise known or not. Few draws cause it, 6.6 standard deviations off at most; the median error is at
+1.07 of the bound, and 95 % of the intervals contain the truth.
 """
 
 from __future__ import annotations

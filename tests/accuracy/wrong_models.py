@@ -3,7 +3,9 @@
     tests/accuracy/run wrong-models                       all pairs, 40 draws each, 10 of them without errors believed
     tests/accuracy/run wrong-models "one drive" --draws 20
 
-Draw number i of every pair has the seed i.
+Draw number i of every pair has the seed i. Models are wrong in ways that are not among their unknowns, except E of A,
+which has a prior of 3 %. Held or warned: inside the interval, or a warning of the residual, the models or a prior.
+Width: over the width of a fit of right models that are `exact`.
 """
 
 from __future__ import annotations

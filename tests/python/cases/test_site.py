@@ -68,7 +68,7 @@ def test_the_site_is_built_without_a_warning(tmp_path):
     text = (tmp_path / "site" / "docs" / "index.html").read_text(encoding="utf-8")
     assert not re.search(r"(src|href)=\"https?://", text)  # it is read without a network
     # nor a server, and on a phone
-    some = {"search.html", "docs/index.html", "docs/accuracy.html", "docs/generated/api/jointfrf.identify.html"}
+    some = {"search.html", "docs/index.html", "docs/validation.html", "docs/generated/api/jointfrf.identify.html"}
     some |= {"docs/generated/examples/amplitude.html", "docs/quickstart.html", "docs/measured-file.html"}
     with started_browser() as browser:
         page = browser.new_context(viewport={"width": 390, "height": 800}).new_page()
