@@ -348,6 +348,15 @@ def test_noise_of_parts_is_in_weights_and_intervals():
             jf.Substructure.of_frfs(FREQ, np.ones((FREQ.size, 1, 1)), ["1:y"], ["1:y"], noise=wrong)
 
 
+def test_noisy_parts_taken_as_exact_give_no_interval():
+    """A part without a model has no errors that the fit could allow for."""
+    channels = ("A/4:y", "A/7:y", "B/1:y", "B/6:y")
+    h = jf.pollute(assembly().receptance(FREQ, channels, channels), 0.01, seed=4)
+    fit = fit_of(FREQ, h, measured_parts(0.0, 0.2), channels, channels)
+    assert "residual-large" in [one.code for one in fit.findings if one.severity == "warning"]
+    assert fit.confidence_interval()["k_y"] == (0.0, np.inf)
+
+
 def test_a_mount_with_mass_and_a_rigid_rotation_is_found():
     mount = jf.LawJoint({"y": jf.StandardLinearSolid(2e5, 6e5, 5e-4)}, rigid=["theta"], mass={"y": 0.06})
     guess = jf.LawJoint({"y": jf.StandardLinearSolid(1e5, 1e5, 1e-3)}, rigid=["theta"], mass={"y": 0.01})

@@ -296,7 +296,7 @@ def with_discrepancy(
 ) -> tuple[Likelihood, Minimum, Errors] | None:
     """Fit models that are far off: with errors of modal matrices and mode shapes, and noise that covers the rest.
 
-    None if such a fit does not converge.
+    None if no part has a model, or if such a fit does not converge.
 
     Parameters
     ----------
@@ -316,6 +316,8 @@ def with_discrepancy(
     """
     vector, n = likelihood.vector, minimum.x.size
     groups = _model_groups(likelihood.prediction, likelihood.measured.size, is_sought=True, of_shapes=True)
+    if not groups:
+        return None
     levels = [np.maximum(one.believed, _FIRST) for one in groups]
     starts = minimum.x, vector.to_coordinates(vector.values)
     x = np.concatenate([starts[0], np.zeros(sum(one.weight.size for one in groups))])
