@@ -55,7 +55,14 @@ _SECTIONS = {
         "docs/performance.md",
         "docs/cases.md",
     ],
-    "Theory": ["docs/theory.md", "docs/equations.md", "docs/engine.md", "docs/accuracy.md", "docs/noise-readings.md"],
+    "Theory": [
+        "docs/theory.md",
+        "docs/equations.md",
+        "docs/engine.md",
+        "docs/accuracy.md",
+        "docs/noise-readings.md",
+        "docs/benchmarks.md",
+    ],
     "Reference": [
         "docs/python.md",
         "docs/generated/api/index.md",
