@@ -161,7 +161,7 @@ def document_table(run: Run) -> str:
                 cells.append("")
                 continue
             numpy, reference = (_ratio(run.ratio(ours, c)) for c in (NUMPY, REFERENCE))
-            cells.append(f"{_time(ours.median)}, {_percent(ours.percent)} %<br>{numpy}×, {reference}×")
+            cells.append(f"{_time(ours.median)}<br>{_percent(ours.percent)} %<br>{numpy}×, {reference}×")
         text.append(f"| `{name}` | " + " | ".join(cells) + " |")
     counts: dict[str, list[str]] = {}
     for name in dict.fromkeys(r.operation for r in run.records):
