@@ -62,6 +62,7 @@ _SECTIONS = {
         "docs/engine.md",
         "docs/accuracy.md",
         "docs/noise-readings.md",
+        "docs/benchmarks.md",
     ],
     "Reference": [
         "docs/python.md",
@@ -132,8 +133,8 @@ def _section(root: Path, title: str, names: list[str]) -> str:
         heading, _, rest = (root / name).read_text(encoding="utf-8").partition("\n")
         prose = [text for text in re.split(r"\n\s*\n", rest.strip()) if not text.startswith(("`" * 3, "|", "<", "#"))]
         first = prose[0].replace("\n", " ")
-        sentence = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", re.split(r"(?<=[.:])\s", first)[0]).rstrip(":")
-        text.append(f"- [{heading.lstrip('# ')}](../../{name}): {sentence}")
+        sentence = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", re.split(r"(?<=[.:])\s", first)[0])
+        text.append(f"- [{heading.lstrip('# ')}](../../{name}): {sentence.rstrip(':.')}.")
     documents = "\n".join(f"../../{name.removesuffix('.md')}" for name in names)
     if title == "Start":
         text[1:1] = [

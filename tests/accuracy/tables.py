@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 HERE = Path(__file__).resolve().parent
-PAGES = tuple(HERE.parents[1] / "docs" / name for name in ("accuracy.md", "checks.md", "performance.md"))
+PAGES = tuple(HERE.parents[1] / "docs" / name for name in ("accuracy.md", "benchmarks.md", "checks.md"))
 _MARKED = re.compile(r"<!-- table(?: (\d+) of)?: (.+?) -->\n(.*?)\n<!-- /table -->", re.DOTALL)
 
 

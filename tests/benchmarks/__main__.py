@@ -125,7 +125,7 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
     )
     parser.add_argument(
         "--document", type=_tables, nargs="?", const=report.TABLES, default=(), metavar="TABLE,...",
-        help=f"put tables into docs/performance.md: {', '.join(report.TABLES)}; both if none is named",
+        help=f"put tables into docs/benchmarks.md: {', '.join(report.TABLES)}; both if none is named",
     )  # fmt: skip
     parser.add_argument(
         "--from", type=Path, dest="source", metavar="FILE.json", help="use these results, measure nothing"
@@ -161,7 +161,7 @@ def main(arguments: list[str] | None = None) -> int:
     if draw_peers(run, options.output / "peers.png"):
         print(f"wrote {options.output / 'peers.png'}")
     for table in options.document:
-        print(report.write_document(run, ROOT / "docs" / "performance.md", table))
+        print(report.write_document(run, ROOT / "docs" / "benchmarks.md", table))
     if old is None:
         return 0
     text, worse = report.comparison(old, run)

@@ -1,8 +1,7 @@
-"""What is printed, and the table of docs/performance.md."""
+"""What is printed, and the tables of docs/benchmarks.md."""
 
 from __future__ import annotations
 
-import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -139,7 +138,7 @@ def _change(old: Record, new: Record) -> str:
 
 
 def document_table(run: Run) -> str:
-    """Return the table of docs/performance.md."""
+    """Return the table of operations of docs/benchmarks.md."""
     machine, one = run.machine, run.limits[0]
     compiler = f"{machine['fortran'].partition(' (')[0]} {machine['fortran'].split()[-1]}"
     found = {r.n for r in run.records if not r.streaming and r.data == "frf" and r.candidate == OURS}
@@ -162,14 +161,12 @@ def document_table(run: Run) -> str:
                 cells.append("")
                 continue
             numpy, reference = (_ratio(run.ratio(ours, c)) for c in (NUMPY, REFERENCE))
-            cells.append(f"{_time(ours.median)}, {_percent(ours.percent)} %<br>{numpy}×, {reference}×")
+            cells.append(f"{_time(ours.median)}<br>{_percent(ours.percent)} %<br>{numpy}×, {reference}×")
         text.append(f"| `{name}` | " + " | ".join(cells) + " |")
     counts: dict[str, list[str]] = {}
     for name in dict.fromkeys(r.operation for r in run.records):
         counts.setdefault(OPERATIONS[name].counts, []).append(f"`{name}`")
-    words = "; ".join(f"{', '.join(names)}: {what.replace('; ', ', ')}" for what, names in counts.items())
-    text += ["", *textwrap.wrap(f"What n counts: {words}.", 120, break_on_hyphens=False)]
-    return "\n".join(text)
+    return "\n".join([*text, *_items("Meaning of n:", {", ".join(names): what for what, names in counts.items()})])
 
 
 def peer_table(run: Run) -> str:
@@ -181,7 +178,8 @@ def peer_table(run: Run) -> str:
     text = [
         f"{machine['processor']}, one thread, {run.date[:10]}, engine {machine['engine']}; {lines} lines of FRFs with "
         f"noise at most, in C order; {clock}least of repetitions in turn.",
-        "Time of a frequency line by jointfrf, and how many times longer the others take; below 1 they are faster.",
+        "Time of a frequency line by jointfrf, and how many times longer the other libraries take. A library with a "
+        "number below 1 is faster.",
         *_warning(machine, "Other programs were running."),
         "",
     ]
@@ -201,13 +199,16 @@ def peer_table(run: Run) -> str:
             if any(ratio is not None for ratio in ratios):
                 shown = ["" if ratio is None else f"{_ns(ratio)}×" for ratio in ratios]
                 text.append(f"| | {_PEER_WORDS.get(candidate, candidate)} | " + " | ".join(shown) + " |")
-    counts = "; ".join(f"`{name}`: {OPERATIONS[name].counts}" for name in operations)
-    versions = "; ".join(f"{name}: {machine['peers'][name]}" for name in there)
-    kernels = "; ".join(f"{owner}: {words}" for owner, words in machine["blas"].items())
-    words = f"What n counts: {counts}. Empty: not timed, or the result was wrong."
-    for line in (words, f"{versions}.", f"BLAS of {kernels}."):
-        text += ["", *textwrap.wrap(line, 150, break_on_hyphens=False, break_long_words=False)]
+    text += _items("Meaning of n:", {f"`{name}`": OPERATIONS[name].counts for name in operations})
+    text += ["", "Empty: not timed, or the result was wrong."]
+    versions = {name: machine["peers"][name] for name in there}
+    text += _items("Versions:", versions | {f"BLAS of {owner}": words for owner, words in machine["blas"].items()})
     return "\n".join(text)
+
+
+def _items(heading: str, items: dict[str, str]) -> list[str]:
+    """Return the lines of a list under a heading."""
+    return ["", heading, "", *(f"- {name}: {words.replace('; ', ', ')}" for name, words in items.items())]
 
 
 def write_document(run: Run, path: Path, table: str) -> str:

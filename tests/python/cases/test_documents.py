@@ -198,7 +198,7 @@ def cells_printed(path):
                     yield re.escape(cell.strip()).replace("\0", r"[^\s|]+(?: [^\s|]+)?")
 
 
-@pytest.mark.parametrize("name", ["docs/accuracy.md", "docs/checks.md", "docs/performance.md"])
+@pytest.mark.parametrize("name", ["docs/accuracy.md", "docs/benchmarks.md", "docs/checks.md"])
 def test_tables_of_studies_have_the_heads_that_these_print(name):
     page, folder = DOCUMENTS[name], ROOT / "tests" / "accuracy"
     found = list(marked(page))
@@ -273,6 +273,7 @@ OWN_TESTS = {
 #: Pages whose Python `test_python_that_shows_no_output_runs` runs, and numbers that make it short.
 SHORT = {
     "docs/checks.md": {},
+    "docs/performance.md": {},
     "docs/report.md": {},
     "docs/studies.md": {"200, design": "2, design", "100_000_000": "2000"},
 }
@@ -302,6 +303,8 @@ def test_python_that_shows_no_output_runs(name, monkeypatch, tmp_path, hammer):
         exec(example, named)
     if name == "docs/checks.md":
         assert named["check"].h.shape == hammer["h"].shape
+    elif name == "docs/performance.md":
+        np.testing.assert_allclose(named["z"], jf.invert(named["h"]))
     elif name == "docs/report.md":
         assert (tmp_path / "report.html").stat().st_size > 50_000
         assert named["fit"].value == named["known"].value
