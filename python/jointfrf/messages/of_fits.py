@@ -736,8 +736,8 @@ FIT_MESSAGES: Final[Mapping[str, Message]] = {
     "factor-effect": Message(
         "note",
         {
-            "": "{parameter} depends on {factor} (chance without: {chance})",
-            "trend": "{parameter} changes with {factor} (chance without: {chance})",
+            "": "{parameter} depends on {factor} (p-value if it had no effect: {chance})",
+            "trend": "{parameter} changes with {factor} (p-value if it had no effect: {chance})",
         },
         "",
         means="Groups of assemblies differ, or the parameter follows the number that you gave.",

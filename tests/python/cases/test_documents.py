@@ -17,7 +17,7 @@ from tables import marked, tables_printed, written
 
 import jointfrf as jf
 from assembly_keys import assembly_page
-from documents import DOCUMENTS, ROOT, agree, blocks, follow, steps
+from documents import DOCUMENTS, ROOT, Step, agree, blocks, commands_shown, follow, steps
 from harmonic_balance import Sliders, iwan_beam
 from jointfrf.toml.declared import read_keys
 from jointfrf.toml.table import TomlTable
@@ -84,7 +84,7 @@ $ two
 
 
 #: Pages that a newcomer follows: every block and every command in a table is a step, in the order of the page.
-WALKED = ("README.md", "docs/index.md", "docs/quickstart.md", "docs/measured-file.md")
+WALKED = ("README.md", "docs/index.md", "docs/quickstart.md", "docs/measured-file.md", "docs/checks.md")
 
 
 @pytest.mark.parametrize("name", ["README.md", "docs/quickstart.md"])
@@ -137,7 +137,7 @@ def test_python_example_of_solid_bodies(capsys):
 
 @pytest.mark.long
 def test_python_of_the_page_on_fits_with_models_prints_what_it_shows(capsys):
-    shown = blocks("text", DOCUMENTS["docs/model-fit.md"])
+    shown = [text for text in blocks("text", DOCUMENTS["docs/model-fit.md"]) if not text.startswith("$ ")]
     for example, text in zip(blocks("python", DOCUMENTS["docs/model-fit.md"]), shown, strict=True):
         exec(example, {})
         agree(capsys.readouterr().out, text)
@@ -272,7 +272,6 @@ OWN_TESTS = {
 }
 #: Pages whose Python `test_python_that_shows_no_output_runs` runs, and numbers that make it short.
 SHORT = {
-    "docs/checks.md": {},
     "docs/performance.md": {},
     "docs/report.md": {},
     "docs/studies.md": {"200, design": "2, design", "100_000_000": "2000"},
@@ -301,9 +300,7 @@ def test_python_that_shows_no_output_runs(name, monkeypatch, tmp_path, hammer):
         for usual, short in SHORT[name].items():
             example = example.replace(usual, short)
         exec(example, named)
-    if name == "docs/checks.md":
-        assert named["check"].h.shape == hammer["h"].shape
-    elif name == "docs/performance.md":
+    if name == "docs/performance.md":
         np.testing.assert_allclose(named["z"], jf.invert(named["h"]))
     elif name == "docs/report.md":
         assert (tmp_path / "report.html").stat().st_size > 50_000
@@ -327,13 +324,13 @@ def hammer():
 
 
 def _shell_blocks():
-    """Blocks of commands with the page's folder; where prompts stand before commands what they print follows."""
+    """Blocks of commands with the page's folder; if prompts stand before commands, their outputs follow."""
     for name, text in DOCUMENTS.items():
         if name not in WALKED and (name, "sh") not in OWN_TESTS:
             yield from ((name, block) for block in blocks("sh", text))
-    for name in ("docs/pools.md", "docs/command-line.md"):
+    for name in ("docs/pools.md", "docs/command-line.md", "docs/model-fit.md", "docs/sides.md", "docs/studies.md"):
         for block in (*blocks("text", DOCUMENTS[name]), *blocks("console", DOCUMENTS[name])):
-            if block.startswith(("$ jointfrf pool", "$ jointfrf new")):
+            if block.startswith(tuple(f"$ jointfrf {command}" for command in ("pool", "new", "identify", "study"))):
                 yield name, block
 
 
@@ -347,14 +344,12 @@ def test_commands_run_and_print_what_is_shown(name, block, tmp_path, monkeypatch
         (tmp_path / path.name).symlink_to(path)
     (tmp_path / "cases").symlink_to(ROOT / "cases")
     monkeypatch.chdir(tmp_path)
-    shown = block.startswith("$ ")
-    commands, _, expected = block.removeprefix("$ ").partition("\n") if shown else (block, "", "")
     environment = os.environ | {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
-    done = subprocess.run(["sh", "-ec", commands], capture_output=True, text=True, check=False, env=environment)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.strip()
-    if shown:
-        agree(done.stdout, expected)
+    for step in commands_shown(block) if block.startswith("$ ") else [Step("sh", block)]:
+        done = subprocess.run(["sh", "-ec", step.code], capture_output=True, text=True, check=False, env=environment)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.strip()
+        agree(done.stdout, done.stdout if step.shown is None else step.shown)
 
 
 def test_joint_in_a_file_of_the_page_on_fits_with_models_is_read(tmp_path):

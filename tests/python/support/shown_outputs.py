@@ -52,7 +52,7 @@ def renewed(page: str) -> str:
             at = page.index(step.code, at) + len(step.code)
             if step.shown is not None:
                 at = page.index(step.shown, at)
-                shown = shortened(printed, step.shown) if "...\n" in step.shown else as_shown(printed)
+                shown = shortened(as_shown(printed), step.shown) if "...\n" in step.shown else as_shown(printed)
                 page = page[:at] + shown + page[at + len(step.shown) :]
                 at += len(shown)
     return page
