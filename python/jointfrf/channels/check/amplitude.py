@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jointfrf.channels.check.residues import fit_poles
 from jointfrf.channels.check.signals import LEAST_LINES, Measurement, as_measurement, check_signals
 from jointfrf.frf.bands import spread_lines
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
@@ -23,9 +24,6 @@ _RISE, _SHARE = 3.0, 1 / 8
 #: Peaks and responses that are looked at for each force, the largest ones: more hardly add to what one mode shows.
 #: Fewer responses cannot agree.
 _PEAKS, _RESPONSES, _LEAST = 10, 8, 3
-#: Steps of the search for the pole, and change, in halves of the band of the peak, at which it is found: it is of third
-#: order in what the further powers leave.
-_STEPS, _FOUND = 15, 1e-4
 #: Significance level, divided by the number of peaks, and shift in half bandwidths from which a resonance counts as
 #: amplitude-dependent: less hardly changes the FRF, other modes that the powers do not quite describe reach 0.1, and
 #: 2 % of noise of the force that goes on over five lines 0.7.
@@ -61,8 +59,8 @@ def amplitude_of_channels(
     if freq_hz[some].size < LEAST_LINES:
         return []
     m = as_measurement(freq_hz[some], h[some], responses, forces, np.asarray(np.isnan(h).all(axis=0)))
-    signals = check_signals(m)
-    return list(amplitude_findings(m, set(signals.rows), set(signals.columns)))
+    _, rows, columns = check_signals(m)
+    return list(amplitude_findings(m, set(rows), set(columns)))
 
 
 def motion_of_lines(h: ComplexArray) -> FloatArray:
@@ -150,21 +148,21 @@ def _look(freq_hz: FloatArray, h: ComplexArray) -> _Peak | None:
     h = h / abs(h).max(axis=0)
     size = np.linalg.norm(h, axis=1)
     width = max(float(np.ptp(x[size > size.max() / np.sqrt(2)])) / 2, float(x[1] - x[0]))
-    alone = _poles(x, h, np.array([x[np.argmax(size)] + 1j * width]))
+    alone = fit_poles(x, h, np.array([x[np.argmax(size)] + 1j * width]))
     if alone is None or 2 * alone[0][0].imag < _LEAST_WIDTH * (x[1] - x[0]):
         return None
-    one, left = _moved(x, h, *alone, _ALONE)
+    one, left = _moved(x, h, *alone[:2], _ALONE)
     size = np.linalg.norm(left, axis=1)
     usual = size < _OUTLYING * np.median(size)
     if not usual.all():  # hum
         x, h = x[usual], h[usual]
-        one, left = _moved(x, h, *alone, _ALONE)
+        one, left = _moved(x, h, *alone[:2], _ALONE)
     if one.chance < _CHANCE and abs(one.shift) > _SHIFT:
         # Two resonances, so close that there is one peak, look like one that moves.
         second = x[np.argmax(np.linalg.norm(left, axis=1))] + 1j * alone[0][0].imag
-        both = _poles(x, h, np.array([alone[0][0], second]))
+        both = fit_poles(x, h, np.array([alone[0][0], second]))
         if both is not None:
-            one = one._replace(chance=max(one.chance, _moved(x, h, *both, _TOGETHER)[0].chance))
+            one = one._replace(chance=max(one.chance, _moved(x, h, *both[:2], _TOGETHER)[0].chance))
     return one._replace(hertz=one.hertz * half)
 
 
@@ -218,39 +216,3 @@ def _of_lines(left: ComplexArray, log: FloatArray, from_pole: ComplexArray, q: C
 def _tail(value: float, degrees: float) -> float:
     """Return the upper tail of F of 2 and twice these degrees."""
     return float((1 + value / degrees) ** -degrees)
-
-
-def _poles(x: FloatArray, h: ComplexArray, poles: ComplexArray) -> tuple[ComplexArray, ComplexArray] | None:
-    """Return poles that all FRFs share, beside a parabola of each, and residues (n_poles, n), by Gauss and Newton."""
-    n = len(poles)
-    residues: ComplexArray = np.zeros((n, h.shape[1]), np.complex128)
-    parabola: FloatArray = np.linalg.qr(x[:, None] ** np.arange(3))[0]
-    h = h - parabola @ (parabola.T @ h)
-    for _ in range(_STEPS):
-        near = 1 / (x[:, None] - poles)
-        q, r = _orthonormal(near - parabola @ (parabola.T @ near))
-        if not abs(np.diagonal(r)).min() > TINY:
-            return None
-        inside = q.conj().T @ h
-        residues = np.asarray(np.linalg.solve(r, inside), np.complex128)
-        # The slope of h by a pole is its residues times 1 / (x - z)^2, less what parabola and poles explain of that.
-        slopes = near**2
-        descent = np.sum(slopes.conj() * ((h - q @ inside) @ residues.conj().T), axis=0)
-        slopes -= parabola @ (parabola.T @ slopes)
-        slopes -= q @ (q.conj().T @ slopes)
-        normal = (slopes.conj().T @ slopes) * (residues.conj() @ residues.T)
-        step = np.linalg.solve(normal + TINY * np.eye(n), descent)
-        step *= min(1.0, 0.5 * float(np.min(poles.imag / np.maximum(abs(step), TINY))))
-        poles = poles + step
-        if abs(step).max() < _FOUND:
-            break
-    return (poles, residues) if (poles.imag > 0).all() and abs(poles[0].real) < 1 else None
-
-
-def _orthonormal(columns: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-    """Return an orthonormal basis of columns and their triangle: `numpy.linalg.qr`, which is slow for one column."""
-    if columns.shape[1] > 1:
-        q, r = np.linalg.qr(columns)
-        return q, r
-    size = max(float(np.linalg.norm(columns)), TINY)
-    return columns / size, np.full((1, 1), size + 0j)

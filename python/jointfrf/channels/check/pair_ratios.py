@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from jointfrf.channels.check.signals import LEAST_SMOOTHNESS, modulus
 from jointfrf.frf.entry_groups import ZERO
 from jointfrf.frf.quantiles import medians
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
 __all__ = [
     "BROKEN",
@@ -21,6 +21,7 @@ __all__ = [
     "are_one_sided",
     "are_signals",
     "block_medians",
+    "exponents",
     "pair_ratios",
     "ratio_line",
     "scatter_of",
@@ -332,14 +333,14 @@ class Polar(NamedTuple):
         return amplitude, phasor
 
 
-def scatter_of(above: Polar, below: Polar) -> FloatArray:
-    """Median over lines of |log(above / below) - constant|: below `BROKEN` where they are one FRF up to a factor."""
+def scatter_of(above: Polar, below: Polar) -> tuple[FloatArray, FloatArray]:
+    """Return the median over lines of |log(above / below) - constant|, and the real part of the constant."""
     amplitude, phasor = above.over(below)
-    rest = amplitude - medians(amplitude.T).T
+    middle = medians(amplitude.T).T
     turn = np.angle(phasor * _unit(phasor.sum(axis=0)).conj())
-    scatter: FloatArray = medians(np.sqrt(rest**2 + turn**2).T).T
+    scatter: FloatArray = medians(np.sqrt((amplitude - middle) ** 2 + turn**2).T).T
     one_is_zero = (above.zero != below.zero).mean(axis=0) > 0.5
-    return np.where(one_is_zero, ONE_SIDED, scatter)
+    return np.where(one_is_zero, ONE_SIDED, scatter), middle
 
 
 def _unit(values: ComplexArray) -> ComplexArray:
@@ -348,26 +349,22 @@ def _unit(values: ComplexArray) -> ComplexArray:
 
 
 def _delays(omega: FloatArray) -> tuple[FloatArray, ComplexArray]:
-    """Delays to try, s, and exp(i w delay), shape (n_delays, n_freq)."""
-    step = np.pi / (omega[-1] - omega[0])
-    steps = step * np.arange(-_STEPS, _STEPS + 1)
-    once = np.exp(1j * omega * step)
-    turns = np.empty((steps.size, omega.size), complex)
-    turns[0] = once ** (-_STEPS)
-    for i in range(1, steps.size):
-        turns[i] = turns[i - 1] * once
-    return steps, turns
+    """Return delays to try, s, and exp(i w delay), shape (n_delays, n_freq)."""
+    steps = np.pi / (omega[-1] - omega[0]) * np.arange(-_STEPS, _STEPS + 1)
+    return steps, np.exp(1j * np.outer(steps, omega))
+
+
+def exponents(omega: FloatArray, log_size: FloatArray) -> FloatArray:
+    """Return the exponents of w in sizes with these logarithms, shape (n_freq, ...), by least squares."""
+    x = np.log(omega)
+    x = x - x.mean()
+    return np.asarray(x @ log_size / max(float(x @ x), TINY))
 
 
 def _powers(omega: FloatArray, amplitude: FloatArray) -> NDArray[np.intp]:
     """Exponent of w in each ratio, from -2 to 2, where this explains it better than a constant."""
-    x, y = block_medians(np.log(omega)[:, None]), block_medians(amplitude)
-    x, y = x - x.mean(), y - y.mean(axis=0)
-    spread = (x**2).sum()
-    if spread == 0:
-        return np.zeros(y.shape[1], np.intp)
-    slope = (x * y).sum(axis=0) / spread
+    x, y = block_medians(np.log(omega)[:, None])[:, 0], block_medians(amplitude)
+    slope = exponents(np.exp(x), y)
     power = np.clip(np.rint(slope), -2, 2)
-    left = ((y - slope * x) ** 2).sum(axis=0)
-    explained = (abs(slope - power) < 0.3) & (left < 0.1 * (y**2).sum(axis=0))
+    explained = (abs(slope - power) < 0.3) & (np.var(y - np.outer(x, slope), axis=0) < 0.1 * np.var(y, axis=0))
     return np.where(explained, power, 0).astype(np.intp)
