@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jointfrf.channels.check.channel_ratios import unit_of_factor
+from jointfrf.channels.check.pair_ratios import exponents
 from jointfrf.channels.check.rigid_motion import ChannelGroup, Suspects, column_size, expected_motion, find_suspects
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.messages.finding import Finding
@@ -167,54 +168,67 @@ class _Cause(NamedTuple):
 def _channel_finding(
     group: ChannelGroup, suspects: Suspects, seen: _Seen, some: _Seen, names: Sequence[str], motion: ComplexArray
 ) -> Finding | None:
-    """Say what is wrong with one channel; None where the deformation of the side may be the reason."""
+    """Report the error of one channel; None if the deformation of the side may be the reason."""
     place = suspects.channels[0]
     error = some.error()
     direction, left = some.fitted()
     other, after = _like_another(group, place, some, motion, suspects.lines)
-    # shares of what it shows, as the error is one of what is expected
+    # Shares of the shown motion become shares of the expected one, as the error is.
     scale = _size(some.shown) / max(_size(some.expected), TINY)
-    explained = left * scale <= _EXPLAINED * error
     copied = after * scale <= _EXPLAINED * error and after < left
-    if error < _NOTICED or (not explained and not copied and error < _LARGE):
+    is_explained = copied or left * scale <= _EXPLAINED * error
+    if error < _NOTICED or not (is_explained or error >= _LARGE):
         return None
-    cause = _cause_in_time(group, seen)
-    if cause is None and not copied and left < _HALF:
-        cause = _of_direction(group, some.direction, direction, left)
-    if cause is None and not copied:
-        cause = _late(seen)
-    if cause is None and (copied or after < 0.5):
-        cause = _Cause("channel-place", {"other": f"{group.word} {names[other]}"}, "copy")
-    if cause is None and error >= _LARGE and suspects.ratio >= _CLEAR_RATIO:
-        cause = _Cause("channel-place", {}, "")
-    if cause is None:
-        return None
-    numbers = _beside(group, suspects, error) | dict(cause.numbers)
-    return Finding(cause.code, numbers, (f"{group.word} {names[place]}",), (), cause.severity, cause.variant)
+    causes = [_quantity(group.word, seen)]
+    if not copied:
+        causes += [_of_direction(some.direction, direction, left) if left < _HALF else None, _late(seen)]
+    if copied or after < 0.5:
+        causes.append(_Cause("channel-place", {"other": f"{group.word} {names[other]}"}, "copy"))
+    if error >= _LARGE and suspects.ratio >= _CLEAR_RATIO:
+        causes.append(_Cause("channel-place", {}, ""))
+    for cause in causes:
+        if cause is not None:
+            numbers = _beside(group, suspects, error) | dict(cause.numbers)
+            return Finding(cause.code, numbers, (f"{group.word} {names[place]}",), (), cause.severity, cause.variant)
+    return None
 
 
-def _cause_in_time(group: ChannelGroup, seen: _Seen) -> _Cause | None:
-    """Say whether a channel is another quantity than the others."""
-    power = _power(seen)
-    if not power:
+def _quantity(word: str, seen: _Seen) -> _Cause | None:
+    """Return the power of i w by which a channel differs from its expected motion."""
+    n, expected, shown = seen.freq_hz.size, seen.expected, seen.shown
+    first = np.linspace(0, n, min(_PARTS, n), endpoint=False).astype(int)
+    lines = (expected.conj() * shown, abs(expected) ** 2, abs(shown) ** 2)
+    product, power_of_expected, power_of_shown = (np.add.reduceat(one.sum(axis=1), first) for one in lines)
+    coherent = abs(product) > _COHERENT * np.maximum(np.sqrt(power_of_expected * power_of_shown), TINY)
+    ratio = product[coherent] / power_of_expected[coherent]
+    middle = (np.add.reduceat(seen.freq_hz, first) / np.diff(first, append=n))[coherent]
+    if middle.size < 3 or middle[-1] < _SPAN * middle[0]:
         return None
-    word = {2: "an acceleration", 1: "a velocity", -1: "divided by i w once", -2: "divided by i w twice"}[power]
-    if group.word == "force":
-        word = f"(i w)^{power} times a force"
-    numbers = {"quantity": f"{word} among other quantities", "action": "Convert it like the other channels"}
-    return _Cause("quantity", numbers)
+    slope = float(exponents(middle, np.log(abs(ratio))))
+    power = round(slope)
+    if not 1 <= abs(power) <= 2 or abs(slope - power) > _EXPONENT:
+        return None
+    if (ratio / abs(ratio) * (-1j) ** power).mean().real <= _COHERENT:
+        return None
+    what = {2: "an acceleration", 1: "a velocity", -1: "divided by i w once", -2: "divided by i w twice"}[power]
+    if word == "force":
+        what = f"(i w)^{power} times a force"
+    action = "Convert it like the other channels"
+    return _Cause("quantity", {"quantity": f"{what} among other quantities", "action": action})
 
 
 def _late(seen: _Seen) -> _Cause | None:
-    """Say whether a channel is late, by more than the deformation of sides turns phases."""
-    delay, left = _delay(seen)
-    if left >= _EXPLAINED:
+    """Return the delay of a channel, if the delay explains more than the deformation of sides turns phases."""
+    omega = 2 * np.pi * seen.freq_hz
+    product = (seen.expected.conj() * seen.shown).sum(axis=1)
+    tried = np.linspace(-1, 1, _STEPS) * _TURNS * 2 * np.pi / omega[-1]
+    delay = float(tried[np.argmax((np.exp(1j * np.outer(tried, omega)) @ product).real)])
+    if seen.share_left(np.exp(-1j * omega * delay)[:, None] * seen.expected) >= _EXPLAINED:
         return None
-    way = "late" if delay > 0 else "early"
-    return _Cause("channel-delay", {"way": way, "delay": 1e6 * abs(delay)}, severity="error")
+    return _Cause("channel-delay", {"way": "late" if delay > 0 else "early", "delay": 1e6 * abs(delay)})
 
 
-def _of_direction(group: ChannelGroup, own: FloatArray, direction: FloatArray, left: float) -> _Cause | None:
+def _of_direction(own: FloatArray, direction: FloatArray, left: float) -> _Cause | None:
     """Read sign, factor or another direction off the vector that explains a channel."""
     along = float(direction @ own)
     across = float(np.linalg.norm(direction - along * own))
@@ -238,37 +252,6 @@ def _axis_of(direction: FloatArray) -> tuple[str, FloatArray]:
     place = int(np.argmax(abs(direction)))
     sign = -1.0 if direction[place] < 0 else 1.0
     return f"{'-' if sign < 0 else '+'}{'xyz'[place]}", sign * np.eye(3)[place]
-
-
-def _power(seen: _Seen) -> int:
-    """Return the power of i w by which a channel differs from the others; 0 where it is none."""
-    parts = np.array_split(np.arange(seen.freq_hz.size), min(_PARTS, seen.freq_hz.size))
-    expected = seen.expected
-    points = []
-    for part in parts:
-        e, s = expected[part].ravel(), seen.shown[part].ravel()
-        product = np.vdot(e, s)
-        if abs(product) > _COHERENT * max(_size(e) * _size(s), TINY):
-            points.append((math.log(float(seen.freq_hz[part].mean())), np.log(product / np.vdot(e, e).real)))
-    if len(points) < 3 or points[-1][0] - points[0][0] < math.log(_SPAN):
-        return 0
-    x, y = np.array([p[0] for p in points]), np.array([p[1] for p in points])
-    slope = float(np.polyfit(x, y.real, 1)[0])
-    power = round(slope)
-    if not 1 <= abs(power) <= 2 or abs(slope - power) > _EXPONENT:
-        return 0
-    turned = np.exp(1j * (y.imag - power * np.pi / 2)).mean()
-    return power if turned.real > _COHERENT else 0
-
-
-def _delay(seen: _Seen) -> tuple[float, float]:
-    """Return the delay in s that explains most of what a channel shows, and the share that is left."""
-    omega = 2 * np.pi * seen.freq_hz
-    product = (seen.expected.conj() * seen.shown).sum(axis=1)
-    tried = np.linspace(-1, 1, _STEPS) * _TURNS * 2 * np.pi / omega[-1]
-    best = float(tried[np.argmax((np.exp(1j * np.outer(tried, omega)) @ product).real)])
-    late = np.exp(-1j * omega * best)[:, None] * seen.expected
-    return best, seen.share_left(late)
 
 
 def _like_another(
