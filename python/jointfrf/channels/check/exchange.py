@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import combinations, permutations
+from collections.abc import Iterable, Iterator
+from itertools import combinations
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -71,8 +71,8 @@ class _Hypothesis(NamedTuple):
     judged: NDArray[np.bool_]
 
 
-def _hypotheses(h: Polar, size: FloatArray, smooth: FloatArray, n_freq: int) -> Iterator[_Hypothesis]:
-    """Yield exchanges of two responses (for reciprocity the same as of two forces), then copies."""
+def _exchanges(h: Polar, size: FloatArray, smooth: FloatArray, n_freq: int) -> Iterator[_Hypothesis]:
+    """Yield exchanges of two responses, for reciprocity the same as exchanges of two forces."""
     n = size.shape[0]
     for pair in combinations(range(n), 2):
         two = np.array(pair)
@@ -80,7 +80,11 @@ def _hypotheses(h: Polar, size: FloatArray, smooth: FloatArray, n_freq: int) -> 
         order[two] = two[::-1]
         judged = _judged(size[order], smooth[order], n_freq)[two]
         yield _Hypothesis("exchanged", pair, h.at(order[two]), h.at(order, two[:, None]), judged)
-    for pair in permutations(range(n), 2):
+
+
+def _copies(h: Polar, size: FloatArray, pairs: Iterable[tuple[int, int]]) -> Iterator[_Hypothesis]:
+    """Yield the second channel of each pair as a copy of the first, of responses and of forces."""
+    for pair in pairs:
         first, copy = pair
         yield _Hypothesis("response", pair, h.at([copy]), h.at([first]), size[[copy]] > 0)
         yield _Hypothesis("force", pair, h.transposed.at([copy]), h.transposed.at([first]), size.T[[copy]] > 0)
@@ -116,21 +120,23 @@ def find_cause(m: Measurement, pairs: PairRatios) -> Cause | None:
     size, smooth = np.asarray(np.median(abs(m.square), axis=0), float), m.square_smoothness
     signals = _judged(size, smooth, len(m.freq_hz))
     named = np.where(signals, _misfit(polar, polar.transposed), 0.0)
+    mean = named.sum(axis=1) / np.maximum(signals.sum(axis=1), 1)
     broken = np.zeros((n, n), bool)
     broken[pairs.p, pairs.q] = broken[pairs.q, pairs.p] = pairs.broken
     directions = [name.rpartition(":")[2] for name in m.dofs]
+    able = [
+        (first, copy)
+        for copy in np.flatnonzero(mean >= BROKEN).tolist()
+        for first in range(n)
+        if first != copy and (broken.any() or directions[first] != directions[copy])
+    ]
     found: list[tuple[int, float, Cause]] = []
-    for one in _hypotheses(polar, size, smooth, len(m.freq_hz)):
+    for one in (*_exchanges(polar, size, smooth, len(m.freq_hz)), *_copies(polar, size, able)):
         at = list(one.channels if one.kind == "exchanged" else one.channels[1:])
-        before = float(named[at].sum() / max(signals[at].sum(), 1))
-        is_copy = one.kind != "exchanged"
-        is_alike = directions[one.channels[0]] == directions[one.channels[1]]
-        if is_copy and (before < BROKEN or (is_alike and not broken.any())):
-            continue
         misfit = _misfit(one.shown, one.expected)[one.judged]
-        if not misfit.size or (is_copy and misfit.max() > BROKEN / 2):
+        if not misfit.size or (one.kind != "exchanged" and misfit.max() > BROKEN / 2):
             continue
-        after = float(misfit.mean())
+        before, after = float(named[at].sum() / max(signals[at].sum(), 1)), float(misfit.mean())
         others = np.delete(np.delete(broken, at, 0), at, 1)
         left = int(others.sum() // 2 + (misfit >= BROKEN).sum())
         if before < _LESS * after + _ROUND_OFF or left > _LEFT * (broken.sum() // 2):
