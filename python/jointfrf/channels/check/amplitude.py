@@ -74,14 +74,20 @@ def motion_of_lines(h: ComplexArray) -> FloatArray:
 def amplitude_findings(m: Measurement, rows: set[int], columns: set[int]) -> Iterator[Finding]:
     """Yield a finding for each force whose FRFs depend on amplitude, of channels that are not left out.
 
-    About a resonance the FRFs of a linear structure are c_p / (f - z), with one pole z for all responses, beside powers
-    of f and further ones of 1 / (f - z). A joint that depends on amplitude makes the pole z + g ln a, a the motion on
-    the line: ln a of a resonance is half of ln(f - z) + ln(f - z*), of which the second has its branch in the half
-    plane where no causal system has anything. So the residual is projected on c_p ln a / (f - z)^2, less what all
-    powers of each response explain of it, and the common g is tested: by F, and by the scatter of each line (HC3), as
-    noise may go with the FRF, both widened by the correlation from line to line. Noise of the force is that of all
-    responses, so that a line is one number: what scatters beside further powers of ln a is tested, too. The largest
-    chance counts, that beside a second pole, too; and the responses must agree, by their scatter.
+    Near a resonance the FRFs of a linear structure are c_p / (f - z), with one pole z for all responses. Powers of f
+    and further powers of 1 / (f - z) describe the other modes. If a joint depends on amplitude, the pole is z + g ln a,
+    where a is the motion on the line. For a resonance, ln a is half of ln(f - z) + ln(f - z*). The second logarithm has
+    its branch in the half plane in which no causal system has a singularity.
+
+    The residual is therefore projected on c_p ln a / (f - z)^2, without the part that all powers of each response
+    explain. Four tests judge the common g, and the largest chance counts:
+
+    - F, widened by the correlation from line to line;
+    - the scatter of each line (HC3), because noise may follow the FRF, widened in the same way;
+    - the scatter along the mode with further powers of ln a, because all responses share the noise of the force;
+    - the same with a second pole.
+
+    In addition, the responses must agree on g, compared with their scatter.
     """
     kept = [i for i in range(len(m.responses)) if i not in rows]
     found = [

@@ -179,7 +179,7 @@ def _is_significant(offsets: Offsets, least: float) -> NDArray[np.bool_]:
 
 
 def gain_findings(measurement: Measurement, ratios: ChannelRatios, side: int) -> Iterator[Finding | Correction]:
-    """Report which channels have another gain than the others, or other units."""
+    """Report the channels whose gain or unit differs from most channels."""
     offsets = ratios.gain
     left = _is_significant(offsets, LEAST_GAIN)
     while left.any():
@@ -226,7 +226,7 @@ def _gain_finding(
 
 
 def delay_findings(measurement: Measurement, ratios: ChannelRatios, side: int) -> Iterator[Finding | Correction]:
-    """Report which channels lag behind the others."""
+    """Report the channels that are late or early compared with most channels."""
     offsets = ratios.delay
     least = LEAST_PHASE / measurement.omega[-1]
     for i in np.flatnonzero(_is_significant(offsets, least)).tolist():

@@ -105,7 +105,7 @@ def check_frfs(
     fix: Sequence[FrfFix] = (),
     blame: Literal["responses", "forces"] = "responses",
 ) -> FrfCheck:
-    """Check measured FRFs before a joint is identified from them: what is wrong, in which channel, and what to do.
+    """Check measured FRFs before a joint is identified: return each error with its channel and its remedy.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def check_frfs(
         Hz.
     h : array_like, shape (n_freq, n_responses, n_forces)
         Measured receptances, m/N, as `identify` takes them; or at measured points, before any transformation. An FRF
-        that is NaN on all lines is missing: it is named, the others are looked at.
+        that is NaN on all lines is missing: the check names it, and judges the remaining FRFs.
     names : sequence of str or Channel, optional
         Names of the channels where responses and forces are the same DOFs, in one order; by default their numbers,
         where `h` is square. Rotations are known by their names, such as ``"j:theta_x"`` or ``"102:rx"``.
@@ -121,14 +121,13 @@ def check_frfs(
         Names of rows and columns where they differ. A response and a force of one name are a driving point;
         ``102:-y`` is the opposite of ``102:+y``.
     transform : (array_like, array_like), shapes (2 n, n_responses), (2 n, n_forces), optional
-        From responses and from forces to joint DOFs j, then k. Where the channels share fewer than two DOFs, the FRFs
-        of the joint DOFs are checked instead; nothing is corrected there.
+        From responses and from forces to joint DOFs j, then k. If the channels share fewer than two DOFs, the FRFs of
+        the joint DOFs are checked instead, and not corrected.
     dofs : sequence of str, optional
         Names of the n joint DOFs, with `transform`.
     joint : JointChannels, optional
-        The channels about a joint, which `joint_channels` finds, instead of names, `transform` and `dofs`: each channel
-        is then compared with the rigid motion that the others on its side show, too, and the places with the
-        reference point.
+        The channels about a joint, which `joint_channels` finds, instead of names, `transform` and `dofs`. The check
+        then compares each channel with the rigid motion of its neighbours, and the places with the reference point.
     read_as : {"receptance", "mobility", "accelerance"}, optional
         The quantity that the FRFs were taken for when they were made receptances, for what to do about it.
     fix : sequence of str
@@ -155,8 +154,8 @@ def check_frfs(
     have Im h < 0 (receptance), Re h > 0 (mobility) or Im h > 0 (accelerance), and all FRFs of a causal system run
     clockwise through the complex plane.
 
-    Channels of a virtual point are judged by the lines on which all but one, or but one sensor, move most like one
-    body: an error there is that of a channel, not the deformation of the side, which grows with frequency.
+    Channels of a virtual point are judged by the lines on which all channels but one, or all but one sensor, move most
+    like one body. The deformation of the side grows with frequency, so it is small on these lines.
 
     Standard errors come from the scatter of the ratios over frequency with their correlation from line to line; a
     difference counts from 5 standard errors and 1 %. One cause that explains many symptoms is reported once.
@@ -233,7 +232,7 @@ def warn_of_sets(*sets: FrfSet, stacklevel: int = 2) -> None:
 
 
 def wrong_numbers(frfs: FrfSet) -> Finding | None:
-    """Return what is wrong with all magnitudes or phases of a set of FRFs; None if nothing is."""
+    """Report wrong magnitudes or phases of all FRFs of a set; None if they are right."""
     lines = frfs.receptance()
     return wrong_numbers_of(lines.freq_hz, lines.h, frfs.quantity)
 
@@ -241,7 +240,7 @@ def wrong_numbers(frfs: FrfSet) -> Finding | None:
 def wrong_numbers_of(
     freq_hz: FloatArray, h: ComplexArray, read_as: str | None = None, hidden: NDArray[np.bool_] | None = None
 ) -> Finding | None:
-    """Return what is wrong with all magnitudes or phases of receptances, which were read as some quantity."""
+    """Report wrong magnitudes or phases of all receptances, which were read as some quantity."""
     missing = np.asarray(np.isnan(h).all(axis=0)) if hidden is None else hidden
     good = (np.isfinite(h) | missing).all(axis=(1, 2)) & (freq_hz > 0)
     if np.count_nonzero(good) < LEAST_LINES:

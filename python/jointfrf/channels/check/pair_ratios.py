@@ -55,11 +55,11 @@ class RatioLine(NamedTuple):
     gain_error : ndarray, shape (n,)
         Standard error of the real part.
     slope, slope_error : ndarray, shape (n,)
-        Of the phase, s.
+        Slope of the phase and its standard error, s.
     at : ndarray, shape (n,)
-        rad/s.
+        Weighted mean of the angular frequency, rad/s.
     inflation : float
-        Variance of a mean over that of independent lines.
+        Variance of a mean, as a multiple of its variance with independent lines.
     """
 
     mean: ComplexArray
@@ -80,72 +80,55 @@ def ratio_line(omega: FloatArray, values: ComplexArray, turn: FloatArray, usable
     Parameters
     ----------
     omega : ndarray, shape (n_freq,)
+        Angular frequencies, rad/s.
     values : ndarray, shape (n_freq, n)
-        log(ratio) near 0: its phase without `turn`.
+        Logarithms of the ratios, with the phase `turn` taken out.
     turn : ndarray, shape (n,)
-        rad.
+        Phases, rad.
     usable : ndarray of bool, shape (n,)
-        Ratios that the correlation between lines is found from.
+        Ratios from which the correlation between lines is estimated.
 
     Notes
     -----
-    The phase at 0 Hz is that of a sign and of powers of i w. Where the data agree with that it is not fitted, which
-    halves the error of the slope or better.
+    A sign and powers of i w have a phase of 0, 90, 180 or 270 degrees at 0 Hz. If the data agree with one of these, the
+    phase at 0 Hz is not fitted, which halves the error of the slope or better.
 
-    Blocks of lines over which the scatter is averaged are longer than the noise is correlated: otherwise chance in a
+    The scatter is averaged over blocks of lines that are longer than the noise is correlated. Otherwise chance in a
     block would be taken for its noise level.
     """
-    fit = _fitted(omega, values, usable, _BLOCK)
-    longer = int(_APART * fit.inflation)
-    if longer > _BLOCK:
-        fit = _fitted(omega, values, usable, longer)
-    total, at, variance = fit.weight.sum(axis=0), fit.at, fit.variance
-    mean, slope = fit.mean + 1j * turn, fit.slope
+    block, longer = 0, _BLOCK
+    while longer > block:
+        is_first, block = block == 0, longer
+        deviation = _block_deviation(values, block)
+        weight, limit = deviation**-2, _CLIP * deviation
+        clipped = np.clip(values.real, -limit, limit) + 1j * np.clip(values.imag, -limit, limit)
+        total = weight.sum(axis=0)
+        mean = (weight * clipped).sum(axis=0) / total
+        at = (weight * omega[:, None]).sum(axis=0) / total
+        lever = omega[:, None] - at
+        inertia = (weight * lever**2).sum(axis=0)
+        slope = (weight * lever * clipped.imag).sum(axis=0) / inertia
+        residual = clipped - mean - 1j * lever * slope
+        inflation = _inflation((residual / deviation)[:, usable])
+        longer = int(_APART * inflation) if is_first else 0
+    # Variance of one line of weight 1, with the correlation.
+    scale = inflation / _lost(inflation, len(omega))
+    variance, phase_variance = ((weight * part**2).mean(axis=0) * scale for part in (residual.real, residual.imag))
+    mean = mean + 1j * turn
     start = mean.imag - at * slope
     start -= np.pi / 2 * np.rint(start / (np.pi / 2))
-    held = abs(start) < _SAME * np.sqrt(variance.imag * (1 / total + at**2 / fit.inertia))
-    moment = (fit.weight * omega[:, None] ** 2).sum(axis=0)
-    # The least squares with start = 0, from those of the free line.
+    held = abs(start) < _SAME * np.sqrt(phase_variance * (1 / total + at**2 / inertia))
+    moment = (weight * omega[:, None] ** 2).sum(axis=0)
+    # Least squares with start = 0, from the estimates of the free line.
     change = np.where(held, at * total * start / moment, 0)
-    inertia = np.where(held, moment, fit.inertia)
     return RatioLine(
         mean=mean - 1j * np.where(held, start - at * change, 0),
-        gain_error=np.hypot(np.sqrt(variance.real / total), LEAST_ERROR),
+        gain_error=np.hypot(np.sqrt(variance / total), LEAST_ERROR),
         slope=slope + change,
-        slope_error=np.hypot(np.sqrt(variance.imag / inertia), LEAST_ERROR / omega[-1]),
+        slope_error=np.hypot(np.sqrt(phase_variance / np.where(held, moment, inertia)), LEAST_ERROR / omega[-1]),
         at=at,
-        inflation=fit.inflation,
+        inflation=inflation,
     )
-
-
-class _Fitted(NamedTuple):
-    """Free line; the variance of real and imaginary part is that of one line of weight 1, with the correlation."""
-
-    weight: FloatArray
-    at: FloatArray
-    mean: ComplexArray
-    slope: FloatArray
-    inertia: FloatArray
-    variance: ComplexArray
-    inflation: float
-
-
-def _fitted(omega: FloatArray, values: ComplexArray, usable: NDArray[np.bool_], block: int) -> _Fitted:
-    deviation = _block_deviation(values, block)
-    weight = deviation**-2
-    clipped = _clipped(values, deviation)
-    total = weight.sum(axis=0)
-    mean = (weight * clipped).sum(axis=0) / total
-    at = (weight * omega[:, None]).sum(axis=0) / total
-    lever = omega[:, None] - at
-    inertia = (weight * lever**2).sum(axis=0)
-    slope = (weight * lever * clipped.imag).sum(axis=0) / inertia
-    left = clipped - mean - 1j * lever * slope
-    # The phase left by a delay is not noise: it was removed before.
-    inflation = _inflation((left / deviation)[:, usable])
-    lost = _lost(inflation, len(omega))
-    real, imaginary = ((weight * part**2).mean(axis=0) * inflation / lost for part in (left.real, left.imag))
-    return _Fitted(weight, at, mean, slope, inertia, real + 1j * imaginary, inflation)
 
 
 def block_medians(values: FloatArray, length: int = _BLOCK) -> FloatArray:
@@ -164,11 +147,6 @@ def _block_deviation(rest: ComplexArray, length: int) -> FloatArray:
     squares = np.maximum(squares, 0.01 * medians(squares.T) + LEAST_ERROR**2)
     place = np.minimum(np.arange(rest.shape[0]) // length, squares.shape[0] - 1)
     return np.asarray(np.sqrt(squares)[place])
-
-
-def _clipped(rest: ComplexArray, deviation: FloatArray) -> ComplexArray:
-    limit = _CLIP * deviation
-    return np.clip(rest.real, -limit, limit) + 1j * np.clip(rest.imag, -limit, limit)
 
 
 def _inflation(standard: ComplexArray) -> float:
@@ -195,13 +173,13 @@ def _lost(inflation: float, n_freq: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class PairRatios:
-    """What is known of h_pq / h_qp = gain (i w)^power exp(i phase - i w delay), for pairs p < q.
+    """Estimates of h_pq / h_qp = gain (i w)^power exp(i phase - i w delay), for pairs p < q.
 
     Attributes
     ----------
     p, q : ndarray of int, shape (n_pairs,)
     usable : ndarray of bool
-        Pairs whose ratio is constant but for power, delay and noise.
+        Pairs whose ratio is constant, apart from power, delay and noise.
     broken : ndarray of bool
         Pairs of two signals that are not the same FRF.
     power : ndarray of int
@@ -214,7 +192,7 @@ class PairRatios:
     scatter : ndarray
         Median of |log(ratio / model)| over lines.
     inflation : float
-        Variance of a mean over that of independent lines.
+        Variance of a mean, as a multiple of its variance with independent lines.
     """
 
     p: NDArray[np.intp]
@@ -307,7 +285,7 @@ class Polar(NamedTuple):
 
     @classmethod
     def of(cls, h: ComplexArray) -> Polar:
-        """Return those of h, shape (n_freq, ...)."""
+        """Return sizes and phases of h, shape (n_freq, ...)."""
         size = modulus(h)
         zero = size == 0
         size = np.where(zero, 1, size)

@@ -1,4 +1,4 @@
-"""What a channel shows that the others around its virtual point do not expect: sign, factor, direction, place."""
+"""Errors of channels around a virtual point: sign, factor, quantity, delay, direction, place."""
 
 from __future__ import annotations
 
@@ -74,16 +74,16 @@ class _Seen:
 
     @property
     def expected(self) -> ComplexArray:
-        """What it should show, shape (n_freq, n)."""
+        """Expected motion of the channel, shape (n_freq, n)."""
         return np.asarray(np.einsum("a,fan->fn", self.direction, self.place))
 
     def error(self) -> float:
-        """Root mean square of shown less expected, over that of the expected."""
+        """Root mean square of the difference, relative to the expected motion."""
         expected = self.expected
         return _size(self.shown - expected) / max(_size(expected), TINY)
 
     def fitted(self) -> tuple[FloatArray, float]:
-        """Return the direction times factor that explains most of what it shows, and the share that is left."""
+        """Return the direction times factor that explains most of the shown motion, and the share of the residual."""
         across = self.place.swapaxes(0, 1).reshape(3, -1)
         both = np.hstack([across.real, across.imag]).T
         shown = np.concatenate([self.shown.real.ravel(), self.shown.imag.ravel()])
@@ -92,7 +92,7 @@ class _Seen:
         return direction, left / max(float(np.linalg.norm(shown)), TINY)
 
     def share_left(self, expected: ComplexArray) -> float:
-        """Return the share of what it shows that another expected motion leaves."""
+        """Return the residual of another expected motion as a share of the shown motion."""
         return _size(self.shown - expected) / max(_size(self.shown), TINY)
 
 
@@ -101,14 +101,16 @@ def _size(values: ComplexArray) -> float:
 
 
 def rigid_faults(group: ChannelGroup, freq_hz: FloatArray, names: Sequence[str]) -> Iterator[RigidFault]:
-    """Find the channels that do not move as the others around the point expect, one cause after the other.
+    """Find the channels that do not share the rigid motion of their neighbours, one cause at a time.
 
     Parameters
     ----------
     group : ChannelGroup
+        Responses or forces of one side.
     freq_hz : ndarray, shape (n_freq,)
+        Frequencies, Hz.
     names : sequence of str
-        Of its channels.
+        Names of its channels.
     """
     left = np.arange(group.size)
     for _ in range(_MOST_FAULTS):
@@ -157,7 +159,7 @@ def _beside(group: ChannelGroup, suspects: Suspects, error: float) -> dict[str, 
 
 
 class _Cause(NamedTuple):
-    """What is wrong with a channel: code and variant of the finding, and its numbers."""
+    """Error of a channel: code and variant of the finding, and its numbers."""
 
     code: str
     numbers: Mapping[str, Any]

@@ -142,7 +142,7 @@ def as_measurement(
     forces: Sequence[str | Channel],
     hidden: NDArray[np.bool_],
 ) -> Measurement:
-    """Pair responses with forces by name; a name like 102:-y is the opposite of 102:+y."""
+    """Pair responses with forces by name. The direction 102:-y is opposite to 102:+y."""
     of_responses = tuple(_both_ways(name)[0] for name in responses)
     of_forces, opposite = zip(*map(_both_ways, forces), strict=True) if forces else ((), ())
     place = {name: (i, 1) for i, name in enumerate(of_forces)}
