@@ -186,9 +186,7 @@ def _moved(
     information = max(float(np.vdot(g, g).real), TINY)
     slope = complex(np.vdot(g, left)) / information
     rest = left - slope * g
-    squares = max(float(np.vdot(rest, rest).real), TINY)
-    correlation = float(np.vdot(rest[:-1], rest[1:]).real) / squares
-    wider = max((1 + correlation) / max(1 - correlation, TINY), 1.0)
+    squares, wider = _squares(rest)
     degrees = max((h.shape[1] * (len(x) - q.shape[1]) - 1) / wider, 1.0)
     span = float(-log.min())
     peak = _Peak(1.0, slope * span, slope * span / poles[0].imag, span)
@@ -211,12 +209,18 @@ def _of_lines(left: ComplexArray, log: FloatArray, from_pole: ComplexArray, q: C
     columns -= q @ (q.conj().T @ columns)
     own = np.linalg.qr(columns)[0]
     noise = left - own @ (own.conj().T @ left)
-    correlation = float(np.vdot(noise[:-1], noise[1:]).real) / max(float(np.vdot(noise, noise).real), TINY)
-    wider = max((1 + correlation) / max(1 - correlation, TINY), 1.0)
+    wider = _squares(noise)[1]
     known = np.maximum(1 - np.sum(abs(q) ** 2, axis=1), 1 / len(left))
     scatter = max(float(np.sum(abs(columns[:, 0] * noise / known) ** 2)), TINY)
     degrees = max((len(left) - q.shape[1] - own.shape[1]) / wider, 1.0)
     return _tail(float(abs(np.vdot(columns[:, 0], left))) ** 2 / scatter / wider, degrees)
+
+
+def _squares(residual: ComplexArray) -> tuple[float, float]:
+    """Return the sum of squares, and the inflation of variances by the correlation from line to line."""
+    squares = max(float(np.vdot(residual, residual).real), TINY)
+    correlation = float(np.vdot(residual[:-1], residual[1:]).real) / squares
+    return squares, max((1 + correlation) / max(1 - correlation, TINY), 1.0)
 
 
 def _tail(value: float, degrees: float) -> float:

@@ -195,7 +195,7 @@ def check_frfs(
     state = _Progress(measurement, 1 if blame == "responses" else 2, read_as)
     state.findings.extend([*_missing_findings(missing, joint, *labels), *found])
     is_enough = measurement.freq_hz.size >= LEAST_LINES and measurement.h.size > 0
-    wrong = wrong_numbers_of(measurement.freq_hz, measurement.h, read_as, measurement.hidden) if is_enough else None
+    wrong = representation_finding(measurement.freq_hz, measurement.h, missing, read_as) if is_enough else None
     if wrong is not None:
         state.findings.append(wrong)  # every other check would find consequences of it
     elif is_enough:
@@ -237,11 +237,9 @@ def wrong_numbers(frfs: FrfSet) -> Finding | None:
     return wrong_numbers_of(lines.freq_hz, lines.h, frfs.quantity)
 
 
-def wrong_numbers_of(
-    freq_hz: FloatArray, h: ComplexArray, read_as: str | None = None, hidden: NDArray[np.bool_] | None = None
-) -> Finding | None:
+def wrong_numbers_of(freq_hz: FloatArray, h: ComplexArray, read_as: str | None = None) -> Finding | None:
     """Report wrong magnitudes or phases of all receptances, which were read as some quantity."""
-    missing = np.asarray(np.isnan(h).all(axis=0)) if hidden is None else hidden
+    missing = np.asarray(np.isnan(h).all(axis=0))
     good = (np.isfinite(h) | missing).all(axis=(1, 2)) & (freq_hz > 0)
     if np.count_nonzero(good) < LEAST_LINES:
         return None

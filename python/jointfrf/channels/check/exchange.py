@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from itertools import combinations
+from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -71,23 +70,24 @@ class _Hypothesis(NamedTuple):
     judged: NDArray[np.bool_]
 
 
-def _exchanges(h: Polar, size: FloatArray, smooth: FloatArray, n_freq: int) -> Iterator[_Hypothesis]:
+def _exchanges(
+    h: Polar, size: FloatArray, smooth: FloatArray, n_freq: int, pairs: NDArray[np.intp]
+) -> Iterator[_Hypothesis]:
     """Yield exchanges of two responses, for reciprocity the same as exchanges of two forces."""
-    n = size.shape[0]
-    for pair in combinations(range(n), 2):
-        two = np.array(pair)
-        order = np.arange(n)
-        order[two] = two[::-1]
-        judged = _judged(size[order], smooth[order], n_freq)[two]
-        yield _Hypothesis("exchanged", pair, h.at(order[two]), h.at(order, two[:, None]), judged)
-
-
-def _copies(h: Polar, size: FloatArray, pairs: Iterable[tuple[int, int]]) -> Iterator[_Hypothesis]:
-    """Yield the second channel of each pair as a copy of the first, of responses and of forces."""
     for pair in pairs:
-        first, copy = pair
-        yield _Hypothesis("response", pair, h.at([copy]), h.at([first]), size[[copy]] > 0)
-        yield _Hypothesis("force", pair, h.transposed.at([copy]), h.transposed.at([first]), size.T[[copy]] > 0)
+        order = np.arange(size.shape[0])
+        order[pair] = pair[::-1]
+        judged = _judged(size[order], smooth[order], n_freq)[pair]
+        channels = int(pair[0]), int(pair[1])
+        yield _Hypothesis("exchanged", channels, h.at(pair[::-1]), h.at(order, pair[:, None]), judged)
+
+
+def _copies(h: Polar, size: FloatArray, pairs: NDArray[np.intp]) -> Iterator[_Hypothesis]:
+    """Yield the second channel of each pair as a copy of the first, of responses and of forces."""
+    for first, copy in pairs.tolist():
+        yield _Hypothesis("response", (first, copy), h.at([copy]), h.at([first]), size[[copy]] > 0)
+        across = h.transposed
+        yield _Hypothesis("force", (first, copy), across.at([copy]), across.at([first]), size.T[[copy]] > 0)
 
 
 def _judged(size: FloatArray, smooth: FloatArray, n_freq: int) -> NDArray[np.bool_]:
@@ -123,15 +123,12 @@ def find_cause(m: Measurement, pairs: PairRatios) -> Cause | None:
     mean = named.sum(axis=1) / np.maximum(signals.sum(axis=1), 1)
     broken = np.zeros((n, n), bool)
     broken[pairs.p, pairs.q] = broken[pairs.q, pairs.p] = pairs.broken
-    directions = [name.rpartition(":")[2] for name in m.dofs]
-    able = [
-        (first, copy)
-        for copy in np.flatnonzero(mean >= BROKEN).tolist()
-        for first in range(n)
-        if first != copy and (broken.any() or directions[first] != directions[copy])
-    ]
+    directions = np.array([name.rpartition(":")[2] for name in m.dofs])
+    alike, off = directions[:, None] == directions, mean >= BROKEN
+    swaps = np.argwhere(np.triu(alike | (off[:, None] & off) | broken.any(), 1))
+    copies = np.argwhere(off & (~alike | broken.any()) & ~np.eye(n, dtype=bool))
     found: list[tuple[int, float, Cause]] = []
-    for one in (*_exchanges(polar, size, smooth, len(m.freq_hz)), *_copies(polar, size, able)):
+    for one in (*_exchanges(polar, size, smooth, len(m.freq_hz), swaps), *_copies(polar, size, copies)):
         at = list(one.channels if one.kind == "exchanged" else one.channels[1:])
         misfit = _misfit(one.shown, one.expected)[one.judged]
         if not misfit.size or (one.kind != "exchanged" and misfit.max() > BROKEN / 2):

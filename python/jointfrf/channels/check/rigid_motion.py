@@ -70,16 +70,13 @@ class ChannelGroup:
     @cached_property
     def motion(self) -> FloatArray:
         """Response of the channels to unit motions of their middle, shape (m, 6); rotations times their reach."""
-        arms = self.positions - self.positions.mean(axis=0)
-        reach = np.sqrt((arms**2).sum(axis=1).mean()) or 1.0
-        return np.hstack([self.directions, np.cross(arms / reach, self.directions)])
+        return np.stack([one @ self.at(place) for place, one in zip(self.positions, self.directions, strict=True)])
 
     def at(self, position: FloatArray) -> FloatArray:
         """Return the displacement of a place for the same unit motions, shape (3, 6)."""
-        arms = self.positions - self.positions.mean(axis=0)
-        reach = np.sqrt((arms**2).sum(axis=1).mean()) or 1.0
-        arm = np.broadcast_to((position - self.positions.mean(axis=0)) / reach, (3, 3))
-        return np.hstack([np.eye(3), np.cross(arm, np.eye(3))])
+        middle = self.positions.mean(axis=0)
+        reach = np.sqrt(((self.positions - middle) ** 2).sum(axis=1).mean()) or 1.0
+        return np.hstack([np.eye(3), np.cross((position - middle) / reach, np.eye(3))])
 
     def filled(self, missing: NDArray[np.bool_]) -> ChannelGroup:
         """Return the same with FRFs that are missing, shape (m, n), as the other channels expect them: neutral."""
@@ -94,9 +91,9 @@ class ChannelGroup:
 
     def only(self, kept: NDArray[np.intp]) -> ChannelGroup:
         """Return the same with some of the channels."""
-        nodes = tuple(self.nodes[i] for i in kept)
-        place, direction, h = self.positions[kept], self.directions[kept], np.ascontiguousarray(self.h[:, kept])
-        return ChannelGroup(self.word, self.side, self.places[kept], nodes, place, direction, self.reference, h)
+        nodes, h = tuple(self.nodes[i] for i in kept), np.ascontiguousarray(self.h[:, kept])
+        positions, directions = self.positions[kept], self.directions[kept]
+        return replace(self, places=self.places[kept], nodes=nodes, positions=positions, directions=directions, h=h)
 
 
 @dataclass(frozen=True, eq=False)

@@ -287,7 +287,16 @@ def find_bad_lines(
     finite = np.isfinite(h)
     good = np.asarray(finite.all(axis=(1, 2)))
     if not good.all():
-        findings.append(_not_finite(freq_hz, finite, good, responses, forces))
+        rows, columns = (
+            tuple(f"{word} {names[i]}" for i in np.flatnonzero(~finite.all(axis=axes)))
+            for word, names, axes in (("response", responses, (0, 2)), ("force", forces, (0, 1)))
+        )
+        some = rows if len(rows) < len(responses) and len(rows) <= len(columns) else columns
+        is_some = len(some) < len(responses if some is rows else forces)
+        first = int(np.argmin(good))
+        numbers = {"count": int((~good).sum()), "total": good.size, "line": first, "freq": float(freq_hz[first])}
+        about, variant = (some, "channels") if is_some else ((), "")
+        findings.append(Finding("not-finite", numbers, about, variant=variant))
     zero = freq_hz == 0
     if zero.any():
         findings.append(Finding("zero-frequency", {"line": int(np.argmax(zero))}))
@@ -298,22 +307,3 @@ def find_bad_lines(
         numbers = {"line": first, "before": float(freq_hz[first - 1]), "after": float(freq_hz[first])}
         findings.append(Finding("frequency-order", numbers))
     return findings, good & ~zero & ascending
-
-
-def _not_finite(
-    freq_hz: FloatArray,
-    finite: NDArray[np.bool_],
-    good: NDArray[np.bool_],
-    responses: tuple[str, ...],
-    forces: tuple[str, ...],
-) -> Finding:
-    """Name the channels with NaN, or the lines if all channels have NaN."""
-    rows, columns = ~finite.all(axis=(0, 2)), ~finite.all(axis=(0, 1))
-    some: tuple[str, ...] = ()
-    if not rows.all() and rows.sum() <= columns.sum():
-        some = tuple(f"response {responses[i]}" for i in np.flatnonzero(rows))
-    elif not columns.all():
-        some = tuple(f"force {forces[i]}" for i in np.flatnonzero(columns))
-    first = int(np.argmin(good))
-    numbers = {"count": int((~good).sum()), "total": good.size, "line": first, "freq": float(freq_hz[first])}
-    return Finding("not-finite", numbers, some, variant="channels" if some else "")
