@@ -322,9 +322,9 @@ def _check_rigid_motion(state: _Progress, joint: JointChannels) -> JointChannels
     m = state.measurement
     for group in _groups(state, joint):
         names, bad = (m.responses, state.bad_rows) if group.word == "response" else (m.forces, state.bad_columns)
-        for fault in rigid_faults(group, m.freq_hz, [names[i] for i in group.places]):
-            state.findings.append(fault.finding)
-            bad.update(fault.places)
+        for finding, places in rigid_faults(group, m.freq_hz, [names[i] for i in group.places]):
+            state.findings.append(finding)
+            bad.update(places)
     try:
         good = joint.without(state.bad_rows, state.bad_columns)
         return good.without_missing(~m.hidden[np.ix_(*_places_of(good, joint))])[0]
@@ -356,8 +356,8 @@ def _groups(state: _Progress, joint: JointChannels) -> Iterator[ChannelGroup]:
             first += len(positions)
             if own.size and columns.size:
                 nodes = tuple(interface.channels[i].node for i in at)
-                seen, directions = h[:, at][:, :, columns], point.motion[own, :3]
-                group = ChannelGroup(word, side, at, nodes, positions[own], directions, point.point, seen)
+                directions = point.motion[own, :3]
+                group = ChannelGroup(word, at, nodes, positions[own], directions, h[:, at][:, :, columns])
                 yield group.filled(gone[np.ix_(at, columns)])
 
 

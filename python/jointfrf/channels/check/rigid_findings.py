@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.messages.finding import Finding
 from jointfrf.messages.message import Severity
 
-__all__ = ["RigidFault", "rigid_faults"]
+__all__ = ["rigid_faults"]
 
 #: Mean square that a suspect causes over that of the others, from which it is one: of bodies without a fault, whose
 #: deformation is no rigid motion either, 8 is exceeded in a third of the groups, 25 in one of 300 with four residuals
@@ -44,15 +44,6 @@ _TURNS, _STEPS = 2.0, 81
 _MOST_FAULTS = 3
 
 
-@dataclass(frozen=True)
-class RigidFault:
-    """One finding about channels of a group, and which rows or columns it is about."""
-
-    finding: Finding
-    word: str
-    places: tuple[int, ...]
-
-
 @dataclass(frozen=True, eq=False)
 class _Seen:
     """What a channel shows beside what the others expect at its place.
@@ -77,6 +68,10 @@ class _Seen:
         """Expected motion of the channel, shape (n_freq, n)."""
         return np.asarray(np.einsum("a,fan->fn", self.direction, self.place))
 
+    def on(self, lines: np.ndarray) -> _Seen:
+        """Return the motions on some lines."""
+        return replace(self, freq_hz=self.freq_hz[lines], shown=self.shown[lines], place=self.place[lines])
+
     def error(self) -> float:
         """Root mean square of the difference, relative to the expected motion."""
         expected = self.expected
@@ -100,7 +95,7 @@ def _size(values: ComplexArray) -> float:
     return float(np.linalg.norm(values))
 
 
-def rigid_faults(group: ChannelGroup, freq_hz: FloatArray, names: Sequence[str]) -> Iterator[RigidFault]:
+def rigid_faults(group: ChannelGroup, freq_hz: FloatArray, names: Sequence[str]) -> Iterator[tuple[Finding, list[int]]]:
     """Find the channels that do not share the rigid motion of their neighbours, one cause at a time.
 
     Parameters
@@ -111,6 +106,11 @@ def rigid_faults(group: ChannelGroup, freq_hz: FloatArray, names: Sequence[str])
         Frequencies, Hz.
     names : sequence of str
         Names of its channels.
+
+    Yields
+    ------
+    tuple
+        Finding, and the rows or columns of its channels.
     """
     left = np.arange(group.size)
     for _ in range(_MOST_FAULTS):
@@ -122,35 +122,32 @@ def rigid_faults(group: ChannelGroup, freq_hz: FloatArray, names: Sequence[str])
         if finding is None:
             return
         bad = left[list(suspects.channels)]
-        yield RigidFault(finding, group.word, tuple(group.places[bad].tolist()))
+        yield finding, group.places[bad].tolist()
         left = np.setdiff1d(left, bad)
 
 
 def _finding(group: ChannelGroup, suspects: Suspects, freq_hz: FloatArray, names: Sequence[str]) -> Finding | None:
     others = np.setdiff1d(np.arange(group.size), suspects.channels)
     motion = expected_motion(group, others)
-    seen = [_seen(group, i, motion, freq_hz) for i in suspects.channels]
-    some = [_on_lines(one, suspects.lines) for one in seen]
+    size = column_size(group.h)
+    # The motion of the others at the place of each suspect; every column has the same weight on every line.
+    seen = [
+        _Seen(freq_hz, group.h[:, i] / size, group.at(group.positions[i]) @ motion / size[:, None], group.directions[i])
+        for i in suspects.channels
+    ]
+    some = [one.on(suspects.lines) for one in seen]
     if suspects.kind == "channel":
         return _channel_finding(group, suspects, seen[0], some[0], names, motion)
     error = math.sqrt(sum(one.error() ** 2 for one in some) / len(some))
     if suspects.ratio < _CLEAR_RATIO or error < _SENSOR_ERROR:
         return None
+    numbers, about = _beside(group, suspects, error), tuple(f"{group.word} {names[i]}" for i in suspects.channels)
     if suspects.kind == "exchanged":
-        names_of = tuple(f"{group.word} {names[i]}" for i in suspects.channels)
-        return Finding("exchanged-channels", _beside(group, suspects, error), names_of, variant="neighbours")
-    return _sensor_finding(group, suspects, some, names, error)
-
-
-def _seen(group: ChannelGroup, i: int, motion: ComplexArray, freq_hz: FloatArray) -> _Seen:
-    """Relate a channel to the motion of the others; every column with the same weight on every line."""
-    size = column_size(group.h)
-    place = np.einsum("ab,fbn->fan", group.at(group.positions[i]), motion) / size[:, None]
-    return _Seen(freq_hz, group.h[:, i] / size, place, group.directions[i])
-
-
-def _on_lines(one: _Seen, lines: np.ndarray) -> _Seen:
-    return _Seen(one.freq_hz[lines], one.shown[lines], one.place[lines], one.direction)
+        return Finding("exchanged-channels", numbers, about, variant="neighbours")
+    turned = _turned(some)
+    if turned is not None:
+        return Finding("channel-direction", numbers | {"shown": turned}, about, variant="sensor")
+    return Finding("channel-place", numbers, about, variant="sensor")
 
 
 def _beside(group: ChannelGroup, suspects: Suspects, error: float) -> dict[str, Any]:
@@ -269,18 +266,6 @@ def _like_another(
             left[other] = some.share_left(expected)
     best = int(np.argmin(left))
     return best, float(left[best])
-
-
-def _sensor_finding(
-    group: ChannelGroup, suspects: Suspects, some: Sequence[_Seen], names: Sequence[str], error: float
-) -> Finding:
-    """Say whether a sensor with several channels is turned, or where it seems to be."""
-    numbers = _beside(group, suspects, error)
-    channels = tuple(f"{group.word} {names[i]}" for i in suspects.channels)
-    turned = _turned(some)
-    if turned is not None:
-        return Finding("channel-direction", numbers | {"shown": turned}, channels, variant="sensor")
-    return Finding("channel-place", numbers, channels, variant="sensor")
 
 
 def _turned(some: Sequence[_Seen]) -> str | None:

@@ -40,26 +40,21 @@ class ChannelGroup:
     Attributes
     ----------
     word : {"response", "force"}
-    side : {"j", "k"}
     places : ndarray of int, shape (m,)
         Rows, or columns, of the FRFs.
     nodes : tuple of int, length m
         Nodes of the channels.
     positions, directions : ndarray, shape (m, 3)
         m; unit vectors.
-    reference : ndarray, shape (3,)
-        Reference point of the side, m.
     h : ndarray, shape (n_freq, m, n)
         FRFs of these channels: n forces for responses, n responses for forces.
     """
 
     word: Literal["response", "force"]
-    side: str
     places: NDArray[np.intp]
     nodes: tuple[int, ...]
     positions: FloatArray
     directions: FloatArray
-    reference: FloatArray
     h: ComplexArray
 
     @property
