@@ -48,7 +48,7 @@ class Cause(NamedTuple):
     channels : tuple of int
         DOFs. The second one is the copy.
     before, after : float
-        Mean misfit of the pairs with these channels, as measured and under the hypothesis.
+        Mean misfit of the pairs with these channels, as measured and under the hypothesis; of a copy, the largest one.
     alternatives : tuple of tuple of int
         Other exchanges with about the same score.
     """
@@ -131,15 +131,17 @@ def find_cause(m: Measurement, pairs: PairRatios) -> Cause | None:
     for one in (*_exchanges(polar, size, smooth, len(m.freq_hz), swaps), *_copies(polar, size, copies)):
         at = list(one.channels if one.kind == "exchanged" else one.channels[1:])
         misfit = _misfit(one.shown, one.expected)[one.judged]
-        if not misfit.size or (one.kind != "exchanged" and misfit.max() > BROKEN / 2):
+        # A copy agrees in all FRFs; both sides of a stiff joint agree in most.
+        after = float((misfit.mean if one.kind == "exchanged" else misfit.max)()) if misfit.size else np.inf
+        if one.kind != "exchanged" and after > BROKEN / 2:
             continue
-        before, after = float(named[at].sum() / max(signals[at].sum(), 1)), float(misfit.mean())
+        before = float(named[at].sum() / max(signals[at].sum(), 1))
         others = np.delete(np.delete(broken, at, 0), at, 1)
         left = int(others.sum() // 2 + (misfit >= BROKEN).sum())
         if before < _LESS * after + _ROUND_OFF or left > _LEFT * (broken.sum() // 2):
             continue
         rest = np.delete(np.delete(named, at, 0), at, 1).sum() / 2
-        found.append((left, float(rest + misfit.sum()), Cause(one.kind, one.channels, before, after)))
+        found.append((left, float(rest + misfit.size * after), Cause(one.kind, one.channels, before, after)))
     if found:
         return _best(found, one_sidedness(m.driving))
     if not broken.any():
