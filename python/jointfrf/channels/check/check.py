@@ -86,7 +86,7 @@ _STOPPED = 2
 #: A channel disagrees with all others if its pairs scatter so many times as much as every pair without it.
 _INCONSISTENT = 4.0
 #: Exchanges and copies that are corrected or left out, one after the other.
-_MOST_CAUSES = 2
+_MOST_CAUSES = 3
 #: Relative noise of channels that may hide small FRFs of joint DOFs, which are differences of large ones.
 _HIDING = 0.05
 

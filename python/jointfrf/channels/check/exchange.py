@@ -29,10 +29,10 @@ __all__ = ["Cause", "cause_findings", "find_cause"]
 _MOST_LINES = 200
 #: Factor by which a hypothesis must lower the misfit of its pairs, and round-off.
 _LESS, _ROUND_OFF = 1.4, 1e-6
-#: Share of the broken pairs that may remain broken.
+#: Share of the broken pairs of its channels that a hypothesis may leave broken.
 _LEFT = 0.25
-#: Scores within this factor are equal.
-_EQUAL = 1.01
+#: Scores within this distance are equal.
+_EQUAL = 0.1
 #: Pairs that a finding names, the worst first.
 _SHOWN = 4
 
@@ -48,7 +48,8 @@ class Cause(NamedTuple):
     channels : tuple of int
         DOFs. The second one is the copy.
     before, after : float
-        Mean misfit of the pairs with these channels, as measured and under the hypothesis; of a copy, the largest one.
+        Geometric mean of the misfits of the pairs with these channels, as measured and under the hypothesis. A copy is
+        judged by its largest misfit.
     alternatives : tuple of tuple of int
         Other exchanges with about the same score.
     """
@@ -97,10 +98,10 @@ def _judged(size: FloatArray, smooth: FloatArray, n_freq: int) -> NDArray[np.boo
     return found
 
 
-def _misfit(shown: Polar, expected: Polar) -> FloatArray:
-    """Return the scatter of log(shown / expected) over lines, with its mean if that is more than a factor of 2."""
+def _misfit(shown: Polar, expected: Polar) -> tuple[FloatArray, FloatArray]:
+    """Return the scatter of log(shown / expected) over lines, and the same with a mean of more than a factor of 2."""
     scatter, gain = scatter_of(shown, expected)
-    return np.hypot(scatter, np.where((abs(gain) > np.log(2)) & (scatter < ONE_SIDED), gain, 0.0))
+    return scatter, np.hypot(scatter, np.where((abs(gain) > np.log(2)) & (scatter < ONE_SIDED), gain, 0.0))
 
 
 def find_cause(m: Measurement, pairs: PairRatios) -> Cause | None:
@@ -109,8 +110,9 @@ def find_cause(m: Measurement, pairs: PairRatios) -> Cause | None:
     Notes
     -----
     Under an exchange of channels a and b, h_aq equals h_qb, and h_bq equals h_qa. Under a copy, h_aq equals h_bq
-    (response), or h_qa equals h_qb (force). The score is the misfit of these ratios, in units of a logarithm, and
-    replaces the misfit of h_aq / h_qa.
+    (response), or h_qa equals h_qb (force). The misfit of these ratios replaces the misfit of h_aq / h_qa. The score is
+    the sum of the logarithms of all misfits: minus the log likelihood of a line, with unknown noise of each pair. A
+    hypothesis has no parameter, so the scores compare as BIC does.
 
     Both sides of a stiff joint move alike. An exchange of these two changes reciprocity by some percent, and equal
     responses there are no evidence of a copy, unless pairs are broken.
@@ -119,44 +121,49 @@ def find_cause(m: Measurement, pairs: PairRatios) -> Cause | None:
     polar, n = Polar.of(some), m.rows.size
     size, smooth = np.asarray(np.median(abs(m.square), axis=0), float), m.square_smoothness
     signals = _judged(size, smooth, len(m.freq_hz))
-    named = np.where(signals, _misfit(polar, polar.transposed), 0.0)
+    named = np.where(signals, _misfit(polar, polar.transposed)[1], 0.0)
     mean = named.sum(axis=1) / np.maximum(signals.sum(axis=1), 1)
+    logs = np.where(signals, np.log(named + _ROUND_OFF), 0.0)
     broken = np.zeros((n, n), bool)
     broken[pairs.p, pairs.q] = broken[pairs.q, pairs.p] = pairs.broken
+    n_broken = int(pairs.broken.sum())
     directions = np.array([name.rpartition(":")[2] for name in m.dofs])
     alike, off = directions[:, None] == directions, mean >= BROKEN
-    swaps = np.argwhere(np.triu(alike | (off[:, None] & off) | broken.any(), 1))
-    copies = np.argwhere(off & (~alike | broken.any()) & ~np.eye(n, dtype=bool))
+    swaps = np.argwhere(np.triu(alike | (off[:, None] & off) | (n_broken > 0), 1))
+    copies = np.argwhere(off & (~alike | (n_broken > 0)) & ~np.eye(n, dtype=bool))
     found: list[tuple[int, float, Cause]] = []
     for one in (*_exchanges(polar, size, smooth, len(m.freq_hz), swaps), *_copies(polar, size, copies)):
         at = list(one.channels if one.kind == "exchanged" else one.channels[1:])
-        misfit = _misfit(one.shown, one.expected)[one.judged]
+        scatter, misfit = (values[one.judged] for values in _misfit(one.shown, one.expected))
         # A copy agrees in all FRFs; both sides of a stiff joint agree in most.
-        after = float((misfit.mean if one.kind == "exchanged" else misfit.max)()) if misfit.size else np.inf
+        own = np.log(misfit + _ROUND_OFF)
+        after = float(np.exp(own.mean() if one.kind == "exchanged" else own.max())) if own.size else np.inf
         if one.kind != "exchanged" and after > BROKEN / 2:
             continue
-        before = float(named[at].sum() / max(signals[at].sum(), 1))
-        others = np.delete(np.delete(broken, at, 0), at, 1)
-        left = int(others.sum() // 2 + (misfit >= BROKEN).sum())
-        if before < _LESS * after + _ROUND_OFF or left > _LEFT * (broken.sum() // 2):
+        before = float(np.exp(logs[at].sum() / max(signals[at].sum(), 1)))
+        others, left = int(np.delete(np.delete(broken, at, 0), at, 1).sum() // 2), int((scatter >= BROKEN).sum())
+        if before < _LESS * after or left > _LEFT * (n_broken - others):
             continue
-        rest = np.delete(np.delete(named, at, 0), at, 1).sum() / 2
-        found.append((left, float(rest + misfit.size * after), Cause(one.kind, one.channels, before, after)))
+        score = float(np.delete(np.delete(logs, at, 0), at, 1).sum() / 2 + own.size * np.log(after))
+        found.append((others + left, score, Cause(one.kind, one.channels, before, after)))
     if found:
-        return _best(found, one_sidedness(m.driving))
-    if not broken.any():
+        return _best(found, one_sidedness(m.driving), _LEFT * n_broken)
+    if not n_broken:
         return None
     before = float(pairs.scatter[pairs.broken].mean())
-    always = np.flatnonzero((broken.sum(axis=1) == broken.sum() // 2) & (broken.sum(axis=1) > 1))
+    always = np.flatnonzero((broken.sum(axis=1) == n_broken) & (broken.sum(axis=1) > 1))
     return Cause("channel" if always.size == 1 else "pairs", tuple(always) if always.size == 1 else (), before, before)
 
 
-def _best(found: list[tuple[int, float, Cause]], driving: FloatArray) -> Cause:
-    """Return the hypothesis with the lowest score; of equal copies, the one that is least like a driving point."""
+def _best(found: list[tuple[int, float, Cause]], driving: FloatArray, most: float) -> Cause:
+    """Return the hypothesis with the lowest score; of equal copies, the one that is least like a driving point.
+
+    Exchanges are alternatives if each leaves at most so many broken pairs: otherwise several channels are wrong.
+    """
     found = sorted(found, key=lambda one: one[:2])
-    equal = [cause for left, score, cause in found if left == found[0][0] and score <= _EQUAL * found[0][1]]
+    equal = [cause for left, score, cause in found if left == found[0][0] and score <= found[0][1] + _EQUAL]
     best = min(equal, key=lambda one: 0.0 if one.kind == "exchanged" else driving[one.channels[1]])
-    if best.kind != "exchanged":
+    if best.kind != "exchanged" or found[0][0] > most:
         return best
     alike = [
         cause.channels
