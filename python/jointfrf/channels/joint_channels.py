@@ -65,7 +65,7 @@ class LeftOutDof(NamedTuple):
     dof, into : str
         The DOF left out, and the one that its motion is attributed to.
     weight : float
-        Of its motion there: 1, m, 1/m.
+        Unit of its motion there: 1, m, 1/m.
     share : float
         Its part in the motion found of that DOF, root mean square over lines and forces; NaN where the channels do not
         show the DOF.
@@ -135,7 +135,7 @@ def offset_couplings(interface: Interface) -> tuple[OffsetCoupling, ...]:
 
     Notes
     -----
-    Where both sides turn by theta as one body, points that are d apart move theta x d against each other: a joint
+    If both sides turn by theta as one body, points that are d apart move theta x d against each other: a joint
     between them resists that, and its stiffness is not diagonal.
 
     Examples
@@ -172,12 +172,12 @@ def left_out_dofs(h: ComplexArray, interface: Interface) -> tuple[LeftOutDof, ..
     Returns
     -------
     tuple of LeftOutDof
-        Of each DOF left out, the one kept that it disturbs most on each side.
+        For each DOF left out, the kept DOF that it disturbs most on each side.
 
     Notes
     -----
-    A channel 6 mm from the reference point along y shows x - 0.006 theta_z where the side turns: with theta_z left out,
-    T M holds -0.006 for its rigid motion M. How much theta_z there is comes from all DOFs that the channels show.
+    If the side turns, a channel 6 mm from the reference point along y shows x - 0.006 theta_z. With theta_z left out,
+    T M contains -0.006 for its rigid motion M. The size of theta_z comes from all DOFs that the channels show.
     """
     n, found = len(interface.dofs), []
     for side in range(2):
@@ -219,7 +219,7 @@ class ChannelAgreement:
     ----------
     channel : Channel
     consistency : float
-        Median over lines of the specific consistency, 0 to 1; 1: the channel moves as the others predict.
+        Median over lines of the specific consistency, 0 to 1; 1: the channel moves as its neighbours predict.
     blame : float
         Mean over lines of the share of the inconsistency of its side that is gone without it, 0 to 1; NaN where the
         other channels cannot check it.
@@ -232,7 +232,7 @@ class ChannelAgreement:
 
 @dataclass(frozen=True)
 class SideAgreement:
-    """The channels of one kind on one side of a joint beside rigid motion.
+    """The channels of one kind on one side of a joint, compared with rigid motion.
 
     Attributes
     ----------
@@ -295,7 +295,7 @@ class JointChannels:
     points : mapping of (kind, side) to VirtualPoint
         ``("response", "j")``, ...
     positions : mapping of (kind, side) to ndarray, shape (m, 3)
-        Where the channels of each virtual point are, m.
+        Positions of the channels of each virtual point, m.
     """
 
     responses: Interface
@@ -447,12 +447,12 @@ def joint_channels(
     dofs : sequence of str
         Joint DOFs.
     at_k : array_like, shape (3,), optional
-        Reference point of side k where it is another one than that of side j.
+        Reference point of side k, by default the reference point of side j.
 
     Returns
     -------
     JointChannels
-        Without channels of which FRFs are missing, where the others suffice.
+        Without channels whose FRFs are missing, if the remaining channels suffice.
 
     Raises
     ------

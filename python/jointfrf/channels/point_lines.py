@@ -116,8 +116,8 @@ def central_difference(
 
     Notes
     -----
-    The rotation is that of a chord: it differs from that of the section by terms in spacing^2, and a moment made of two
-    forces strains the material between them. `difference_error` estimates what this does to a joint.
+    The rotation is the rotation of a chord. It differs from the rotation of the section by terms in spacing^2, and a
+    moment made of two forces strains the material between them. `difference_error` estimates the error of a joint.
 
     Examples
     --------
@@ -186,11 +186,11 @@ class DifferenceError(NamedTuple):
     Attributes
     ----------
     compliance : float
-        What they add to the rotational compliance of the joint, rad/(N m).
+        Addition to the rotational compliance of the joint, rad/(N m).
     bias : float
         The same as a share of the joint's compliance: at low frequency k is found as k / (1 + bias).
     noise_gain : float
-        Variance of a rotational receptance over that of a translational one: sum of squared weights, squared, 1/m^4.
+        Ratio of the variances of rotational and translational receptances: sum of squared weights, squared, 1/m^4.
     """
 
     compliance: float
@@ -222,8 +222,8 @@ def difference_error(spacing: float | ArrayLike, bending_stiffness: float, joint
     Notes
     -----
     A moment is applied as two opposite forces at +-dx, and the rotation read from the displacements there. Between the
-    points the beam bends under this couple: strain energy theory gives dx/(6 E I) more compliance on each side of the
-    joint, dx/(3 E I) in all, at low frequency and for a joint in the middle of the points.
+    points the beam bends under this couple. By strain energy, this adds dx/(6 E I) to the compliance of each side of
+    the joint, dx/(3 E I) in all, at low frequency and for a joint in the middle of the points.
 
     Examples
     --------
@@ -257,8 +257,8 @@ class Interface(NamedTuple):
         Motion of each channel for a unit of x, y, z, theta_x, theta_y, theta_z of the reference point of side j, then
         of side k, where the sides are rigid: 1 or m/rad.
     compliance : ndarray, shape (n,), or None
-        What the bending of the sides between the points is expected to add to the compliance of each joint DOF, m/N or
-        rad/(N m), where that is known.
+        Expected addition of the bending of the sides between the points to the compliance of each joint DOF, m/N or
+        rad/(N m), if known.
     placed : bool
         Whether the positions of the points are known.
     """

@@ -67,10 +67,10 @@ class VirtualPoint(NamedTuple):
         point), so that it does not depend on units. 1 is best; above some hundreds the point lies far from the
         channels, or some DOF is poorly observed.
     point : ndarray, shape (3,)
-        Where it is, m.
+        Position of the point, m.
     motion : ndarray, shape (m, 6)
-        Displacement of each channel for a unit of x, y, z, theta_x, theta_y, theta_z of the point, 1 or m/rad: `modes`
-        and what they leave out.
+        Displacement of each channel for a unit of x, y, z, theta_x, theta_y, theta_z of the point, 1 or m/rad; `modes`
+        has the columns of the DOFs.
     """
 
     dofs: tuple[str, ...]
@@ -111,7 +111,7 @@ def virtual_point(
     Parameters
     ----------
     positions : array_like, shape (m, 3)
-        Where the channels are, m. A triaxial accelerometer is three channels at one place.
+        Positions of the channels, m. A triaxial accelerometer is three channels at one place.
     directions : array_like, shape (m, 3)
         Unit vector of each channel: of the measured motion, or of the force of an impact. They may be rounded to two
         digits and are brought to length one.
@@ -131,15 +131,15 @@ def virtual_point(
     Raises
     ------
     ValueError
-        Wrong shapes, names, directions or weights; fewer channels than DOFs; DOFs that the channels do not show, or
-        cannot distinguish: they are named.
+        Wrong shapes, names, directions or weights, or fewer channels than DOFs. The message names DOFs that the
+        channels do not show, or cannot distinguish.
 
     Notes
     -----
     A channel at r from the point with direction e shows e . (t + theta x r), so that its row of R is [e, r x e]. Its
     transpose takes forces at the channels to force and moment at the point, R^T f = m, and T^T distributes them back
     with least squares. The receptance of the point is T_u H T_f^T (`jointfrf.transform`); T_u and T_f may come from
-    different channels. What is not rigid motion is averaged out: `sensor_consistency` measures how much that is.
+    different channels. Motion that is not rigid is averaged out; `sensor_consistency` measures its share.
 
     References
     ----------
@@ -148,7 +148,7 @@ def virtual_point(
 
     Examples
     --------
-    Three channels on a line, 10 mm apart: the slope is that of central differences.
+    Three channels on a line, 10 mm apart: the slope is the central difference.
 
     >>> import numpy as np
     >>> from jointfrf import virtual_point
@@ -216,7 +216,7 @@ def virtual_points(side_j: VirtualPoint, side_k: VirtualPoint) -> FloatArray:
     -----
     ``identify(freq_hz, h, vp.dofs, transform=...)`` takes one transformation where impacts are at the places and in the
     directions of the channels, and with the method "compliance" a pair, of responses and of forces, where they are
-    elsewhere. `virtual_interface` holds the geometry of the channels, too, from which the fit sees what is not rigid.
+    elsewhere. `virtual_interface` contains the geometry of the channels, too, so that the fit can test their rigidity.
 
     Examples
     --------
@@ -386,13 +386,13 @@ class Consistency(NamedTuple):
     Attributes
     ----------
     overall : ndarray, shape (n_freq,)
-        Size of the filtered over that of the measured responses, 0 to 1; 1: all motion is rigid.
+        Size of the filtered responses, relative to the measured ones, 0 to 1; 1: all motion is rigid.
     specific : ndarray, shape (n_freq, m)
         Agreement of each channel with its filtered response, 0 to 1. One bad channel also spoils those next to it.
     blame : ndarray, shape (n_freq, m)
         Share of the inconsistency that is gone when this channel is left out, 0 to 1. Exactly 1 for a channel that
-        alone is wrong, in sign, gain, phase or name, whatever the others do; below 1 for the others. 0 where there is
-        no inconsistency, and for channels that the others cannot check (`VirtualPoint.redundancy` 0).
+        alone is wrong, in sign, gain, phase or name, for any motion; below 1 for all other channels. 0 without
+        inconsistency, and for channels that have no redundancy (`VirtualPoint.redundancy` 0).
     """
 
     overall: FloatArray
@@ -408,7 +408,7 @@ def sensor_consistency(h: ArrayLike, point: VirtualPoint) -> Consistency:
     h : array_like, shape (n_freq, m, n_in)
         FRFs of the channels of `point` to any forces, m/N, or accelerances.
     point : VirtualPoint
-        Of the channels.
+        Virtual point of the channels.
 
     Returns
     -------
@@ -431,7 +431,7 @@ def sensor_consistency(h: ArrayLike, point: VirtualPoint) -> Consistency:
     Numerators and denominators are summed over the columns of `h`, so that forces do not cancel. The source takes the
     responses to one combination of forces f: pass ``h @ f``. A line or channel without motion gives NaN.
 
-    Where some directions move much more than others, their noise hides an error of the small ones: give `point` the
+    If some directions move much more than others, their noise hides an error of the small ones. Then give `point` the
     weights 1 / variance of the noise, for noise relative to each FRF ``1 / np.mean(abs(h) ** 2, axis=(0, 2))``.
 
     References
@@ -485,7 +485,7 @@ def impact_consistency(h: ArrayLike, point: VirtualPoint) -> Consistency:
     h : array_like, shape (n_freq, n_out, m)
         FRFs of any responses to the impacts of `point`, m/N, or accelerances.
     point : VirtualPoint
-        Of the impacts: their positions and the directions of their forces.
+        Virtual point of the impacts, with their positions and the directions of their forces.
 
     Returns
     -------
@@ -516,7 +516,7 @@ def impact_consistency(h: ArrayLike, point: VirtualPoint) -> Consistency:
 
 
 class DrivingPointCheck(NamedTuple):
-    """Whether FRFs can be those of a reciprocal, passive structure.
+    """Agreement of FRFs with a reciprocal, passive structure.
 
     Attributes
     ----------
@@ -525,8 +525,8 @@ class DrivingPointCheck(NamedTuple):
     driving_point : ndarray, shape (n_freq, n)
         Im H_aa / |H_aa|: above zero the force at a DOF takes power out of the structure.
     passivity : ndarray, shape (n_freq,)
-        Above zero some combination of forces takes power out of the structure; the size is relative to that of the
-        line, so that 1 % noise gives some 0.01.
+        Above zero some combination of forces takes power out of the structure; the size is relative to the size
+        of the line, so that 1 % noise gives some 0.01.
     """
 
     reciprocity: FloatArray
@@ -535,7 +535,7 @@ class DrivingPointCheck(NamedTuple):
 
 
 def driving_point_check(h: ArrayLike) -> DrivingPointCheck:
-    """Reciprocity and passivity of receptances between the same DOFs, as those of a virtual point must have.
+    """Reciprocity and passivity of receptances between the same DOFs, for example of a virtual point.
 
     Parameters
     ----------

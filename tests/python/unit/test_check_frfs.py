@@ -121,6 +121,37 @@ def test_of_two_channels_the_copy_is_the_one_that_is_no_driving_point():
                 assert names(structure("3.1"))[seed % 2] in finding.about[1]
 
 
+def test_a_copy_is_not_taken_for_the_other_side_of_a_stiff_joint():
+    """Both sides of the joint of case 3.2 move alike, except on a few lines of some FRFs."""
+    for error, word in (("response doubled", "response"), ("force doubled", "force")):
+        (finding,) = check_with_error(structure("3.2"), ERRORS[error], "complex", 0.005, 1).check.findings
+        assert finding.about == (f"{word} k:Fy", f"{word} j:Mtheta")
+
+
+def test_an_exchange_is_found_together_with_a_gain():
+    """A gain adds the same misfit to pairs as measured and under any hypothesis."""
+    s = structure("six")
+    freq, h = measured(s, "complex", 0.02, 5)
+    h = h[:, [3, 1, 2, 0, *range(4, 12)]]
+    h[:, 5] *= 3
+    found = jf.check_frfs(freq, h, names(s)).findings
+    assert {(one.code, frozenset(one.about)) for one in found} == {
+        ("exchanged-channels", frozenset({names(s)[0], names(s)[3]})), ("channel-gain", frozenset({names(s)[5]})),
+    }  # fmt: skip
+
+
+def test_two_exchanges_are_both_found():
+    s = structure("six")
+    freq, h = measured(s, "complex", 0.02, 4)
+    h = h[:, [1, 0, 2, 3, 4, 8, 6, 7, 5, 9, 10, 11]]
+    found = jf.check_frfs(freq, h, names(s), fix=["exchanged"])
+    codes = [finding.code for finding in found.findings]
+    pairs = {frozenset(finding.about) for finding in found.findings}
+    assert codes == ["exchanged-channels"] * 2
+    assert pairs == {frozenset(names(s)[i] for i in pair) for pair in ((0, 1), (5, 8))}
+    assert jf.check_frfs(freq, found.h, names(s)).ok
+
+
 @pytest.mark.parametrize(
     ("fix", "code", "change"),
     [

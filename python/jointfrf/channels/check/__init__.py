@@ -1,5 +1,5 @@
-"""Checks of measured FRFs before a fit: bad lines, bad channels, quantity, sign, gain, delay.
+"""Checks of measured FRFs before a fit: wrong lines and channels, quantity, sign, gain, delay.
 
-Limits beside the code are those that FRFs without errors keep to with noise of up to 10 % of any kind:
-`tests/accuracy/checks.py` counts false alarms and errors found (docs/checks.md).
+FRFs without errors keep to the limits in the code with up to 10 % noise of any kind. `tests/accuracy/checks.py` counts
+false alarms and detected errors (docs/checks.md).
 """

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jointfrf.channels.check.residues import fit_poles
 from jointfrf.channels.check.signals import LEAST_LINES, Measurement, as_measurement, check_signals
 from jointfrf.frf.bands import spread_lines
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
@@ -23,9 +24,6 @@ _RISE, _SHARE = 3.0, 1 / 8
 #: Peaks and responses that are looked at for each force, the largest ones: more hardly add to what one mode shows.
 #: Fewer responses cannot agree.
 _PEAKS, _RESPONSES, _LEAST = 10, 8, 3
-#: Steps of the search for the pole, and change, in halves of the band of the peak, at which it is found: it is of third
-#: order in what the further powers leave.
-_STEPS, _FOUND = 15, 1e-4
 #: Significance level, divided by the number of peaks, and shift in half bandwidths from which a resonance counts as
 #: amplitude-dependent: less hardly changes the FRF, other modes that the powers do not quite describe reach 0.1, and
 #: 2 % of noise of the force that goes on over five lines 0.7.
@@ -61,8 +59,8 @@ def amplitude_of_channels(
     if freq_hz[some].size < LEAST_LINES:
         return []
     m = as_measurement(freq_hz[some], h[some], responses, forces, np.asarray(np.isnan(h).all(axis=0)))
-    signals = check_signals(m)
-    return list(amplitude_findings(m, set(signals.rows), set(signals.columns)))
+    _, rows, columns = check_signals(m)
+    return list(amplitude_findings(m, set(rows), set(columns)))
 
 
 def motion_of_lines(h: ComplexArray) -> FloatArray:
@@ -76,14 +74,20 @@ def motion_of_lines(h: ComplexArray) -> FloatArray:
 def amplitude_findings(m: Measurement, rows: set[int], columns: set[int]) -> Iterator[Finding]:
     """Yield a finding for each force whose FRFs depend on amplitude, of channels that are not left out.
 
-    About a resonance the FRFs of a linear structure are c_p / (f - z), with one pole z for all responses, beside powers
-    of f and further ones of 1 / (f - z). A joint that depends on amplitude makes the pole z + g ln a, a the motion on
-    the line: ln a of a resonance is half of ln(f - z) + ln(f - z*), of which the second has its branch in the half
-    plane where no causal system has anything. So the residual is projected on c_p ln a / (f - z)^2, less what all
-    powers of each response explain of it, and the common g is tested: by F, and by the scatter of each line (HC3), as
-    noise may go with the FRF, both widened by the correlation from line to line. Noise of the force is that of all
-    responses, so that a line is one number: what scatters beside further powers of ln a is tested, too. The largest
-    chance counts, that beside a second pole, too; and the responses must agree, by their scatter.
+    Near a resonance the FRFs of a linear structure are c_p / (f - z), with one pole z for all responses. Powers of f
+    and further powers of 1 / (f - z) describe the other modes. If a joint depends on amplitude, the pole is z + g ln a,
+    where a is the motion on the line. For a resonance, ln a is half of ln(f - z) + ln(f - z*). The second logarithm has
+    its branch in the half plane in which no causal system has a singularity.
+
+    The residual is therefore projected on c_p ln a / (f - z)^2, without the part that all powers of each response
+    explain. Four tests judge the common g, and the largest chance counts:
+
+    - F, widened by the correlation from line to line;
+    - the scatter of each line (HC3), because noise may follow the FRF, widened in the same way;
+    - the scatter along the mode with further powers of ln a, because all responses share the noise of the force;
+    - the same with a second pole.
+
+    In addition, the responses must agree on g, compared with their scatter.
     """
     kept = [i for i in range(len(m.responses)) if i not in rows]
     found = [
@@ -150,21 +154,21 @@ def _look(freq_hz: FloatArray, h: ComplexArray) -> _Peak | None:
     h = h / abs(h).max(axis=0)
     size = np.linalg.norm(h, axis=1)
     width = max(float(np.ptp(x[size > size.max() / np.sqrt(2)])) / 2, float(x[1] - x[0]))
-    alone = _poles(x, h, np.array([x[np.argmax(size)] + 1j * width]))
+    alone = fit_poles(x, h, np.array([x[np.argmax(size)] + 1j * width]))
     if alone is None or 2 * alone[0][0].imag < _LEAST_WIDTH * (x[1] - x[0]):
         return None
-    one, left = _moved(x, h, *alone, _ALONE)
+    one, left = _moved(x, h, *alone[:2], _ALONE)
     size = np.linalg.norm(left, axis=1)
     usual = size < _OUTLYING * np.median(size)
     if not usual.all():  # hum
         x, h = x[usual], h[usual]
-        one, left = _moved(x, h, *alone, _ALONE)
+        one, left = _moved(x, h, *alone[:2], _ALONE)
     if one.chance < _CHANCE and abs(one.shift) > _SHIFT:
         # Two resonances, so close that there is one peak, look like one that moves.
         second = x[np.argmax(np.linalg.norm(left, axis=1))] + 1j * alone[0][0].imag
-        both = _poles(x, h, np.array([alone[0][0], second]))
+        both = fit_poles(x, h, np.array([alone[0][0], second]))
         if both is not None:
-            one = one._replace(chance=max(one.chance, _moved(x, h, *both, _TOGETHER)[0].chance))
+            one = one._replace(chance=max(one.chance, _moved(x, h, *both[:2], _TOGETHER)[0].chance))
     return one._replace(hertz=one.hertz * half)
 
 
@@ -182,9 +186,7 @@ def _moved(
     information = max(float(np.vdot(g, g).real), TINY)
     slope = complex(np.vdot(g, left)) / information
     rest = left - slope * g
-    squares = max(float(np.vdot(rest, rest).real), TINY)
-    correlation = float(np.vdot(rest[:-1], rest[1:]).real) / squares
-    wider = max((1 + correlation) / max(1 - correlation, TINY), 1.0)
+    squares, wider = _squares(rest)
     degrees = max((h.shape[1] * (len(x) - q.shape[1]) - 1) / wider, 1.0)
     span = float(-log.min())
     peak = _Peak(1.0, slope * span, slope * span / poles[0].imag, span)
@@ -207,50 +209,20 @@ def _of_lines(left: ComplexArray, log: FloatArray, from_pole: ComplexArray, q: C
     columns -= q @ (q.conj().T @ columns)
     own = np.linalg.qr(columns)[0]
     noise = left - own @ (own.conj().T @ left)
-    correlation = float(np.vdot(noise[:-1], noise[1:]).real) / max(float(np.vdot(noise, noise).real), TINY)
-    wider = max((1 + correlation) / max(1 - correlation, TINY), 1.0)
+    wider = _squares(noise)[1]
     known = np.maximum(1 - np.sum(abs(q) ** 2, axis=1), 1 / len(left))
     scatter = max(float(np.sum(abs(columns[:, 0] * noise / known) ** 2)), TINY)
     degrees = max((len(left) - q.shape[1] - own.shape[1]) / wider, 1.0)
     return _tail(float(abs(np.vdot(columns[:, 0], left))) ** 2 / scatter / wider, degrees)
 
 
+def _squares(residual: ComplexArray) -> tuple[float, float]:
+    """Return the sum of squares, and the inflation of variances by the correlation from line to line."""
+    squares = max(float(np.vdot(residual, residual).real), TINY)
+    correlation = float(np.vdot(residual[:-1], residual[1:]).real) / squares
+    return squares, max((1 + correlation) / max(1 - correlation, TINY), 1.0)
+
+
 def _tail(value: float, degrees: float) -> float:
     """Return the upper tail of F of 2 and twice these degrees."""
     return float((1 + value / degrees) ** -degrees)
-
-
-def _poles(x: FloatArray, h: ComplexArray, poles: ComplexArray) -> tuple[ComplexArray, ComplexArray] | None:
-    """Return poles that all FRFs share, beside a parabola of each, and residues (n_poles, n), by Gauss and Newton."""
-    n = len(poles)
-    residues: ComplexArray = np.zeros((n, h.shape[1]), np.complex128)
-    parabola: FloatArray = np.linalg.qr(x[:, None] ** np.arange(3))[0]
-    h = h - parabola @ (parabola.T @ h)
-    for _ in range(_STEPS):
-        near = 1 / (x[:, None] - poles)
-        q, r = _orthonormal(near - parabola @ (parabola.T @ near))
-        if not abs(np.diagonal(r)).min() > TINY:
-            return None
-        inside = q.conj().T @ h
-        residues = np.asarray(np.linalg.solve(r, inside), np.complex128)
-        # The slope of h by a pole is its residues times 1 / (x - z)^2, less what parabola and poles explain of that.
-        slopes = near**2
-        descent = np.sum(slopes.conj() * ((h - q @ inside) @ residues.conj().T), axis=0)
-        slopes -= parabola @ (parabola.T @ slopes)
-        slopes -= q @ (q.conj().T @ slopes)
-        normal = (slopes.conj().T @ slopes) * (residues.conj() @ residues.T)
-        step = np.linalg.solve(normal + TINY * np.eye(n), descent)
-        step *= min(1.0, 0.5 * float(np.min(poles.imag / np.maximum(abs(step), TINY))))
-        poles = poles + step
-        if abs(step).max() < _FOUND:
-            break
-    return (poles, residues) if (poles.imag > 0).all() and abs(poles[0].real) < 1 else None
-
-
-def _orthonormal(columns: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-    """Return an orthonormal basis of columns and their triangle: `numpy.linalg.qr`, which is slow for one column."""
-    if columns.shape[1] > 1:
-        q, r = np.linalg.qr(columns)
-        return q, r
-    size = max(float(np.linalg.norm(columns)), TINY)
-    return columns / size, np.full((1, 1), size + 0j)

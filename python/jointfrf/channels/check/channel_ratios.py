@@ -23,7 +23,6 @@ __all__ = [
     "channel_ratios",
     "delay_findings",
     "gain_findings",
-    "unexplained_gains",
     "unit_of_factor",
 ]
 
@@ -96,63 +95,29 @@ class ChannelRatios:
     delay: Offsets
 
 
-@dataclass(frozen=True, eq=False)
-class _Trees:
-    """A path of pairs from the first channel of each group to every other one.
-
-    Attributes
-    ----------
-    group : ndarray of int, shape (n,)
-    steps : list of (int, int, int, int)
-        Channel, the one before it, the pair between them, and 1 where the channel is the first of the pair, else -1.
-    """
-
-    group: NDArray[np.intp]
-    steps: list[tuple[int, int, int, int]]
-
-    def summed(self, difference: FloatArray) -> FloatArray:
-        """Values of channels from the differences of pairs along the paths, zero at the first of each group."""
-        value = np.zeros(self.group.size)
-        for channel, before, pair, turn in self.steps:
-            value[channel] = value[before] + turn * difference[pair]
-        return value
-
-
-def _trees(n: int, p: NDArray[np.intp], q: NDArray[np.intp]) -> _Trees:
-    group = np.full(n, -1)
-    steps: list[tuple[int, int, int, int]] = []
-    for first in range(n):
-        if group[first] >= 0:
-            continue
-        group[first] = first
-        front = [first]
-        while front:
-            at = front.pop(0)
-            for ends, others, turn in ((p, q, -1), (q, p, 1)):
-                for pair in np.flatnonzero(ends == at):
-                    other = int(others[pair])
-                    if group[other] < 0:
-                        group[other] = first
-                        steps.append((other, at, int(pair), turn))
-                        front.append(other)
-    return _Trees(group, steps)
-
-
 def channel_ratios(pairs: PairRatios, n: int, *, least_gain: float, least_delay: float) -> ChannelRatios:
     """Assign the ratios of pairs to channels; differences below `least_gain`, `least_delay` count as none."""
     use = pairs.usable
     p, q = pairs.p[use], pairs.q[use]
-    trees = _trees(n, p, q)
-    group = trees.group
+    linked, phase = np.eye(n, dtype=bool), np.zeros((n, n))
+    linked[p, q] = linked[q, p] = True
+    phase[p, q], phase[q, p] = pairs.phase[use], -pairs.phase[use]
+    reached = linked
+    for _ in range(n.bit_length()):
+        reached = reached @ reached
+    group = np.argmax(reached, axis=1)
     gain = _solved(group, p, q, pairs.log_gain[use], pairs.gain_error[use] ** -2)
     delay = _solved(group, p, q, pairs.delay[use], pairs.delay_error[use] ** -2)
-    power = np.rint(trees.summed(pairs.power[use].astype(float))).astype(np.intp)
+    power = _solved(group, p, q, pairs.power[use].astype(float), np.ones(p.size))[0]
+    sign = np.ones(n, np.intp)
     for number in np.unique(group):
-        power[group == number] -= power[group == number].min()
-    phase = pairs.phase[use] - np.pi / 2 * (power[p] - power[q])
-    turned = np.rint(trees.summed((np.cos(phase) < 0).astype(float))).astype(np.intp)
-    sign = np.where(turned % 2 == 1, -1, 1)
-    return ChannelRatios(group, power, sign, _offsets(group, *gain, least_gain), _offsets(group, *delay, least_delay))
+        some = np.flatnonzero(group == number)
+        power[some] = np.rint(power[some] - power[some].min())
+        turn = phase[np.ix_(some, some)] - np.pi / 2 * (power[some, None] - power[some])
+        leading = np.linalg.eigh(linked[np.ix_(some, some)] * np.sign(np.cos(turn)))[1][:, -1]
+        sign[some] = np.where(leading * leading[0] < 0, -1, 1)
+    gains, delays = _offsets(group, *gain, least_gain), _offsets(group, *delay, least_delay)
+    return ChannelRatios(group, power.astype(np.intp), sign, gains, delays)
 
 
 def _solved(
@@ -213,19 +178,8 @@ def _is_significant(offsets: Offsets, least: float) -> NDArray[np.bool_]:
     return found
 
 
-def unexplained_gains(measurement: Measurement, ratios: ChannelRatios) -> FloatArray:
-    """Return the logarithms of the gains that are significant and that no unit explains; 0 for others, shape (n,)."""
-    offsets = ratios.gain
-    gain = np.where(_is_significant(offsets, LEAST_GAIN), offsets.value, 0.0)
-    for i in np.flatnonzero(gain):
-        tolerance = max(_UNIT_TOLERANCE, 4 * float(offsets.error[i]))
-        if unit_of_factor(math.exp(gain[i]), bool(measurement.rotations[i]), tolerance) is not None:
-            gain[i] = 0
-    return gain
-
-
 def gain_findings(measurement: Measurement, ratios: ChannelRatios, side: int) -> Iterator[Finding | Correction]:
-    """Report which channels have another gain than the others, or other units."""
+    """Report the channels whose gain or unit differs from most channels."""
     offsets = ratios.gain
     left = _is_significant(offsets, LEAST_GAIN)
     while left.any():
@@ -272,7 +226,7 @@ def _gain_finding(
 
 
 def delay_findings(measurement: Measurement, ratios: ChannelRatios, side: int) -> Iterator[Finding | Correction]:
-    """Report which channels lag behind the others."""
+    """Report the channels that are late or early compared with most channels."""
     offsets = ratios.delay
     least = LEAST_PHASE / measurement.omega[-1]
     for i in np.flatnonzero(_is_significant(offsets, least)).tolist():

@@ -14,15 +14,12 @@ from jointfrf.channels.check.amplitude import amplitude_findings
 from jointfrf.channels.check.channel_ratios import (
     LEAST_GAIN,
     LEAST_PHASE,
-    ChannelRatios,
     channel_ratios,
     delay_findings,
     gain_findings,
-    unexplained_gains,
 )
 from jointfrf.channels.check.driving_points import (
     Sectors,
-    circles,
     convention_finding,
     mean_exponent,
     passivity_findings,
@@ -31,13 +28,7 @@ from jointfrf.channels.check.driving_points import (
     sectors,
     sign_findings,
 )
-from jointfrf.channels.check.exchange import (
-    Cause,
-    broken_findings,
-    cause_of_broken_pairs,
-    cause_of_gains,
-    hidden_exchange,
-)
+from jointfrf.channels.check.exchange import cause_findings, find_cause
 from jointfrf.channels.check.pair_ratios import PairRatios, pair_ratios
 from jointfrf.channels.check.representation import representation_finding
 from jointfrf.channels.check.residues import (
@@ -90,12 +81,12 @@ __all__ = [
     "wrong_numbers_of",
 ]
 
-#: Share of FRFs that run backwards from which all are conjugated.
-_BACKWARDS = 0.8
 #: Errors that the message of a fit that stops repeats.
 _STOPPED = 2
 #: A channel disagrees with all others if its pairs scatter so many times as much as every pair without it.
 _INCONSISTENT = 4.0
+#: Exchanges and copies that are corrected or left out, one after the other.
+_MOST_CAUSES = 3
 #: Relative noise of channels that may hide small FRFs of joint DOFs, which are differences of large ones.
 _HIDING = 0.05
 
@@ -114,7 +105,7 @@ def check_frfs(
     fix: Sequence[FrfFix] = (),
     blame: Literal["responses", "forces"] = "responses",
 ) -> FrfCheck:
-    """Check measured FRFs before a joint is identified from them: what is wrong, in which channel, and what to do.
+    """Check measured FRFs before a joint is identified: return each error with its channel and its remedy.
 
     Parameters
     ----------
@@ -122,7 +113,7 @@ def check_frfs(
         Hz.
     h : array_like, shape (n_freq, n_responses, n_forces)
         Measured receptances, m/N, as `identify` takes them; or at measured points, before any transformation. An FRF
-        that is NaN on all lines is missing: it is named, the others are looked at.
+        that is NaN on all lines is missing: the check names it, and judges the remaining FRFs.
     names : sequence of str or Channel, optional
         Names of the channels where responses and forces are the same DOFs, in one order; by default their numbers,
         where `h` is square. Rotations are known by their names, such as ``"j:theta_x"`` or ``"102:rx"``.
@@ -130,14 +121,13 @@ def check_frfs(
         Names of rows and columns where they differ. A response and a force of one name are a driving point;
         ``102:-y`` is the opposite of ``102:+y``.
     transform : (array_like, array_like), shapes (2 n, n_responses), (2 n, n_forces), optional
-        From responses and from forces to joint DOFs j, then k. Where the channels share fewer than two DOFs, the FRFs
-        of the joint DOFs are checked instead; nothing is corrected there.
+        From responses and from forces to joint DOFs j, then k. If the channels share fewer than two DOFs, the FRFs of
+        the joint DOFs are checked instead, and not corrected.
     dofs : sequence of str, optional
         Names of the n joint DOFs, with `transform`.
     joint : JointChannels, optional
-        The channels about a joint, which `joint_channels` finds, instead of names, `transform` and `dofs`: each channel
-        is then compared with the rigid motion that the others on its side show, too, and the places with the
-        reference point.
+        The channels about a joint, which `joint_channels` finds, instead of names, `transform` and `dofs`. The check
+        then compares each channel with the rigid motion of its neighbours, and the places with the reference point.
     read_as : {"receptance", "mobility", "accelerance"}, optional
         The quantity that the FRFs were taken for when they were made receptances, for what to do about it.
     fix : sequence of str
@@ -164,8 +154,8 @@ def check_frfs(
     have Im h < 0 (receptance), Re h > 0 (mobility) or Im h > 0 (accelerance), and all FRFs of a causal system run
     clockwise through the complex plane.
 
-    Channels of a virtual point are judged by the lines on which all but one, or but one sensor, move most like one
-    body: an error there is that of a channel, not the deformation of the side, which grows with frequency.
+    Channels of a virtual point are judged by the lines on which all channels but one, or all but one sensor, move most
+    like one body. The deformation of the side grows with frequency, so it is small on these lines.
 
     Standard errors come from the scatter of the ratios over frequency with their correlation from line to line; a
     difference counts from 5 standard errors and 1 %. One cause that explains many symptoms is reported once.
@@ -205,7 +195,7 @@ def check_frfs(
     state = _Progress(measurement, 1 if blame == "responses" else 2, read_as)
     state.findings.extend([*_missing_findings(missing, joint, *labels), *found])
     is_enough = measurement.freq_hz.size >= LEAST_LINES and measurement.h.size > 0
-    wrong = wrong_numbers_of(measurement.freq_hz, measurement.h, read_as, measurement.hidden) if is_enough else None
+    wrong = representation_finding(measurement.freq_hz, measurement.h, missing, read_as) if is_enough else None
     if wrong is not None:
         state.findings.append(wrong)  # every other check would find consequences of it
     elif is_enough:
@@ -213,7 +203,7 @@ def check_frfs(
         unspoilt = None
         if joint is not None:
             state.findings.extend(reference_findings(joint, float(freq[-1])))
-            unspoilt = _check_rigid_motion(state, joint, missing)
+            unspoilt = _check_rigid_motion(state, joint)
         _check_channels(state)
         state.findings.extend(amplitude_findings(state.corrected(), state.bad_rows, state.bad_columns))
         if state.measurement.rows.size < 2:
@@ -242,16 +232,14 @@ def warn_of_sets(*sets: FrfSet, stacklevel: int = 2) -> None:
 
 
 def wrong_numbers(frfs: FrfSet) -> Finding | None:
-    """Return what is wrong with all magnitudes or phases of a set of FRFs; None if nothing is."""
+    """Report wrong magnitudes or phases of all FRFs of a set; None if they are right."""
     lines = frfs.receptance()
     return wrong_numbers_of(lines.freq_hz, lines.h, frfs.quantity)
 
 
-def wrong_numbers_of(
-    freq_hz: FloatArray, h: ComplexArray, read_as: str | None = None, hidden: NDArray[np.bool_] | None = None
-) -> Finding | None:
-    """Return what is wrong with all magnitudes or phases of receptances, which were read as some quantity."""
-    missing = np.asarray(np.isnan(h).all(axis=0)) if hidden is None else hidden
+def wrong_numbers_of(freq_hz: FloatArray, h: ComplexArray, read_as: str | None = None) -> Finding | None:
+    """Report wrong magnitudes or phases of all receptances, which were read as some quantity."""
+    missing = np.asarray(np.isnan(h).all(axis=0))
     good = (np.isfinite(h) | missing).all(axis=(1, 2)) & (freq_hz > 0)
     if np.count_nonzero(good) < LEAST_LINES:
         return None
@@ -322,25 +310,24 @@ def _missing_findings(
 
 
 def _check_signals(state: _Progress) -> None:
-    """Find dead and doubled channels, which nothing else is said of."""
-    signals = check_signals(state.measurement)
-    state.findings.extend(signals.findings)
-    state.bad_rows.update(signals.rows)
-    state.bad_columns.update(signals.columns)
+    """Find dead and doubled channels, which no other check judges."""
+    findings, rows, columns = check_signals(state.measurement)
+    state.findings.extend(findings)
+    state.bad_rows.update(rows)
+    state.bad_columns.update(columns)
 
 
-def _check_rigid_motion(state: _Progress, joint: JointChannels, missing: NDArray[np.bool_]) -> JointChannels | None:
-    """Compare each channel with the motion of its neighbours; return the joint of those that nothing is wrong with."""
-    for group in _groups(state, joint, missing):
-        names = state.measurement.responses if group.word == "response" else state.measurement.forces
-        bad = state.bad_rows if group.word == "response" else state.bad_columns
-        for fault in rigid_faults(group, state.measurement.freq_hz, [names[i] for i in group.places]):
-            state.findings.append(fault.finding)
-            bad.update(fault.places)
+def _check_rigid_motion(state: _Progress, joint: JointChannels) -> JointChannels | None:
+    """Compare each channel with the motion of its neighbours; return the joint without the wrong channels."""
+    m = state.measurement
+    for group in _groups(state, joint):
+        names, bad = (m.responses, state.bad_rows) if group.word == "response" else (m.forces, state.bad_columns)
+        for finding, places in rigid_faults(group, m.freq_hz, [names[i] for i in group.places]):
+            state.findings.append(finding)
+            bad.update(places)
     try:
         good = joint.without(state.bad_rows, state.bad_columns)
-        rows, columns = _places_of(good, joint)
-        return good.without_missing(~missing[np.ix_(rows, columns)])[0]
+        return good.without_missing(~m.hidden[np.ix_(*_places_of(good, joint))])[0]
     except ValueError:
         return None
 
@@ -352,32 +339,26 @@ def _places_of(some: JointChannels, joint: JointChannels) -> tuple[list[int], li
     return rows, columns
 
 
-def _groups(state: _Progress, joint: JointChannels, missing: NDArray[np.bool_]) -> Iterator[ChannelGroup]:
-    """Yield the responses and the forces of both sides, without those that are known to be wrong."""
+def _groups(state: _Progress, joint: JointChannels) -> Iterator[ChannelGroup]:
+    """Yield the responses and the forces of both sides, without channels in which an error was found."""
     m = state.measurement
     words: tuple[tuple[Literal["response", "force"], str], ...] = (("response", "response"), ("force", "excitation"))
     for word, kind in words:
+        bad, across, h, gone, interface = state.bad_rows, state.bad_columns, m.h, m.hidden, joint.responses
+        if word == "force":
+            bad, across, h, gone, interface = across, bad, h.swapaxes(1, 2), gone.T, joint.forces
+        columns = np.setdiff1d(np.arange(h.shape[2]), [*across])
         first = 0
         for side in ("j", "k"):
             point, positions = joint.points[kind, side], joint.positions[kind, side]
-            # a response that is found wrong is not there when the forces are looked at
-            bad, across = state.bad_rows, state.bad_columns
-            h, gone = m.h, missing
-            channels = joint.responses.channels
-            if word == "force":
-                bad, across, h, gone = across, bad, h.swapaxes(1, 2), missing.T
-                channels = joint.forces.channels
-            own = np.array([i for i in range(len(positions)) if first + i not in bad and point.weights[i] > 0], np.intp)
-            columns = np.array([i for i in range(h.shape[2]) if i not in across], np.intp)
+            own = np.setdiff1d(np.flatnonzero(point.weights > 0), [i - first for i in bad])
             at = own + first
             first += len(positions)
-            if not own.size or not columns.size:
-                continue
-            nodes = tuple(channels[i].node for i in at)
-            group = ChannelGroup(
-                word, side, at, nodes, positions[own], point.motion[own, :3], point.point, h[:, at][:, :, columns]
-            )
-            yield group.filled(gone[np.ix_(at, columns)])
+            if own.size and columns.size:
+                nodes = tuple(interface.channels[i].node for i in at)
+                directions = point.motion[own, :3]
+                group = ChannelGroup(word, at, nodes, positions[own], directions, h[:, at][:, :, columns])
+                yield group.filled(gone[np.ix_(at, columns)])
 
 
 def _findings_at_channels(state: _Progress, joint: JointChannels, every: JointChannels) -> list[Finding]:
@@ -386,11 +367,9 @@ def _findings_at_channels(state: _Progress, joint: JointChannels, every: JointCh
     m = state.corrected()
     t_out, t_in = joint.responses.transform, joint.forces.transform
     h = m.h[:, rows][:, :, columns]
-    groups = _groups(state, every, m.hidden)
-    share = np.max([not_rigid(group) for group in groups], axis=0)
+    share = np.max([not_rigid(group) for group in _groups(state, every)], axis=0)
     found = side_findings(m.freq_hz, t_out @ h @ t_in.T, share, _hidden(h, t_out, t_in), state.read_as)
-    known = {finding.code for finding in state.findings}
-    return [finding for finding in found if finding.code not in known]
+    return _new_findings(state, found)
 
 
 def _findings_at_joint(
@@ -408,7 +387,19 @@ def _findings_at_joint(
             f"dofs must name {t_out.shape[0] / 2:g} joint DOFs, half the rows of transform, not {len(names)}"
         )
     labels = [f"{side}:{name}" for side in "jk" for name in names]
-    return _judged_at_joint(state, m.freq_hz, m.h, (t_out, t_in), labels)
+    hidden = _hidden(m.h, t_out, t_in)
+    joint = _Progress(
+        as_measurement(m.freq_hz, t_out @ m.h @ t_in.T, labels, labels, hidden), state.side, state.read_as
+    )
+    _check_signals(joint)
+    _check_channels(joint)
+    return _new_findings(state, joint.findings)
+
+
+def _new_findings(state: _Progress, found: Iterable[Finding]) -> list[Finding]:
+    """Return the findings whose codes have not been reported."""
+    known = {finding.code for finding in state.findings}
+    return [finding for finding in found if finding.code not in known]
 
 
 def _hidden(channels: ComplexArray, t_out: FloatArray, t_in: FloatArray) -> np.ndarray:
@@ -419,79 +410,48 @@ def _hidden(channels: ComplexArray, t_out: FloatArray, t_in: FloatArray) -> np.n
     return hidden
 
 
-def _judged_at_joint(
-    state: _Progress,
-    freq_hz: FloatArray,
-    channels: ComplexArray,
-    transforms: tuple[FloatArray, FloatArray],
-    labels: Sequence[str],
-) -> list[Finding]:
-    """Return findings at joint DOFs, of kinds that the channels have not shown."""
-    t_out, t_in = transforms
-    h = t_out @ channels @ t_in.T
-    hidden = _hidden(channels, t_out, t_in)
-    joint = _Progress(as_measurement(freq_hz, h, labels, labels, hidden), state.side, state.read_as)
-    _check_signals(joint)
-    _check_channels(joint)
-    known = {finding.code for finding in state.findings}
-    return [finding for finding in joint.findings if finding.code not in known]
-
-
 def _check_channels(state: _Progress) -> None:
     """Judge time convention, reciprocity, driving points, in this order: each cause is reported once."""
     rows, columns = sorted(state.bad_rows), sorted(state.bad_columns)
     m = state.measurement = state.measurement.without(rows, columns)
     smooth = m.smoothness.copy()
     smooth[rows], smooth[:, columns] = 0, 0
-    around = circles(m.omega, m.h, smooth)
-    if around.seen and around.value > 0 and around.share >= _BACKWARDS:
-        state.findings.append(convention_finding(around))
+    conjugated = convention_finding(m.omega, m.h, smooth)
+    if conjugated is not None:
+        state.findings.append(conjugated)
         state.corrections.append(Correction("time-convention", "all FRFs conjugated", conjugate=True))
     if not m.rows.size:
         return
     m = state.corrected()
     pairs = pair_ratios(m.omega, m.square, m.square_smoothness)
-    if pairs.broken.any():
-        cause = cause_of_broken_pairs(m.square, m.square_smoothness, _matrix(pairs.broken, pairs, m.rows.size))
-        m, pairs = _explained(state, m, pairs, cause)
+    for _ in range(_MOST_CAUSES):
+        cause = find_cause(m, pairs)
+        if cause is None:
+            break
+        state.add(cause_findings(m, pairs, cause, state.side))
+        if cause.kind == "pairs":
+            break
+        if cause.kind != "exchanged":
+            at = list(cause.channels[-1:])
+            state.measurement = state.measurement.without(m.rows[at].tolist(), m.columns[at].tolist())
+        m = state.corrected()
         if not m.rows.size:
             return
+        pairs = pair_ratios(m.omega, m.square, m.square_smoothness)
     _check_ratios(state, m, pairs)
 
 
-def _explained(state: _Progress, m: Measurement, pairs: PairRatios, cause: Cause) -> tuple[Measurement, PairRatios]:
-    """Add what explains FRFs that are not reciprocal; return the measurement without it."""
-    state.add(broken_findings(m, pairs, cause, state.side))
-    if cause.kind != "exchanged" and cause.channels:
-        at = list(cause.channels[-1:])
-        state.measurement = state.measurement.without(m.rows[at].tolist(), m.columns[at].tolist())
-    m = state.corrected()
-    return m, pair_ratios(m.omega, m.square, m.square_smoothness)
-
-
-def _ratios(m: Measurement, pairs: PairRatios) -> ChannelRatios:
-    return channel_ratios(pairs, m.rows.size, least_gain=LEAST_GAIN, least_delay=LEAST_PHASE / m.omega[-1])
-
-
 def _check_ratios(state: _Progress, m: Measurement, pairs: PairRatios) -> None:
-    ratios = _ratios(m, pairs)
-    directions = [name.rpartition(":")[2] for name in m.dofs]
-    cause = hidden_exchange(m.square, directions) or cause_of_gains(m.square, unexplained_gains(m, ratios), directions)
-    if cause is not None:
-        m, pairs = _explained(state, m, pairs, cause)
-        if not m.rows.size:
-            return
-        ratios = _ratios(m, pairs)
-    driving = _driving(m.square)
-    sector, strength = sectors(driving), None
+    ratios = channel_ratios(pairs, m.rows.size, least_gain=LEAST_GAIN, least_delay=LEAST_PHASE / m.omega[-1])
+    sector, strength = sectors(m.driving), None
     if m.rows.size == 1:  # no reciprocity: the other responses of the column show the modes
         sector, strength = _of_column(state, m, sector)
-    exponent = mean_exponent(m.omega, driving * m.omega[:, None] ** -ratios.power.astype(float))
+    exponent = mean_exponent(m.omega, m.driving * m.omega[:, None] ** -ratios.power.astype(float))
     span = float(m.freq_hz[-1] / m.freq_hz[0])
     found = quantities(ratios.group, ratios.power, ratios.sign, sector, exponent, span, strength)
     if strength is None and found.power.any():
         # |h| between few resonances may rise with frequency as that of accelerances does; residues do not.
-        strength = strength_exponent(resonances(m.freq_hz, driving))
+        strength = strength_exponent(resonances(m.freq_hz, m.driving))
         if strength is not None:
             found = quantities(ratios.group, ratios.power, ratios.sign, sector, exponent, span, strength)
     state.add(quantity_findings(m, found, sector, state.read_as))
@@ -501,24 +461,21 @@ def _check_ratios(state: _Progress, m: Measurement, pairs: PairRatios) -> None:
     state.add(gains)
     state.add(delay_findings(m, ratios, state.side))
     state.findings.extend(inconsistent_findings(m, pairs))
-    if not any(finding.code in ("passivity", "driving-point-residues") for finding in state.findings):
-        left = state.corrected()
-        noise = _noise(pairs, m.rows.size)
-        delayed = {name for finding in state.findings if finding.code == "channel-delay" for name in finding.about}
-        # Where a channel that is left out took all pairs along, nothing is known of the correlation between lines.
-        is_lost = not pairs.usable.any() and any(finding.code == "doubled-channel" for finding in state.findings)
+    codes = {finding.code for finding in state.findings}
+    if not codes & {"passivity", "driving-point-residues"}:
+        # A copy that is left out may contain all pairs: the correlation between lines is then unknown.
+        is_lost = not pairs.usable.any() and "doubled-channel" in codes
         inflation = np.inf if is_lost else pairs.inflation
-        active = passivity_findings(left, _driving(left.square), noise, inflation)
-        # A delay of a force turns its driving point the other way than one of the response that was taken out.
+        active = passivity_findings(state.corrected(), _noise(pairs, m.rows.size), inflation)
+        # A delay of a force turns its driving point the other way than a delay of the response.
+        delayed = {name for finding in state.findings if finding.code == "channel-delay" for name in finding.about}
         state.findings.extend(finding for finding in active if not delayed.issuperset(finding.about))
 
 
 def _of_column(state: _Progress, m: Measurement, sector: Sectors) -> tuple[Sectors, float | None]:
     """Judge the only driving point by the resonances of its column; return its half plane and how residues grow."""
     row, column = int(m.rows[0]), int(m.columns[0])
-    use = np.flatnonzero(
-        (m.smoothness[:, column] > LEAST_SMOOTHNESS) & ~np.isin(np.arange(len(m.responses)), [*state.bad_rows])
-    )
+    use = np.setdiff1d(np.flatnonzero(m.smoothness[:, column] > LEAST_SMOOTHNESS), [*state.bad_rows])
     if row not in use:
         return sector, None
     found = resonances(m.freq_hz, m.h[:, use, column] * m.signs[0])
@@ -526,12 +483,11 @@ def _of_column(state: _Progress, m: Measurement, sector: Sectors) -> tuple[Secto
     findings = list(driving_point_findings(found, place, [m.responses[i] for i in use]))
     state.findings.extend(findings)
     signs = signs_at(found)[:, place]
-    quarter = sector.quarter
     if findings:
-        quarter = np.full(1, -1)
+        sector = replace(sector, quarter=np.full(1, -1))
     elif np.count_nonzero(signs) >= LEAST_MODES:
-        quarter = np.full(1, 0 if signs.sum() > 0 else 2)
-    return replace(sector, quarter=quarter), strength_exponent(found)
+        sector = replace(sector, quarter=np.full(1, 0 if signs.sum() > 0 else 2))
+    return sector, strength_exponent(found)
 
 
 def inconsistent_findings(m: Measurement, pairs: PairRatios) -> Iterator[Finding]:
@@ -556,21 +512,12 @@ def inconsistent_findings(m: Measurement, pairs: PairRatios) -> Iterator[Finding
             yield Finding("channel-inconsistent", numbers, (m.dofs[channel],))
 
 
-def _driving(h: ComplexArray) -> ComplexArray:
-    return np.asarray(np.einsum("faa->fa", h))
-
-
-def _matrix(values: np.ndarray, pairs: PairRatios, n: int) -> np.ndarray:
-    matrix = np.zeros((n, n), values.dtype)
-    matrix[pairs.p, pairs.q] = matrix[pairs.q, pairs.p] = values
-    return matrix
-
-
 def _noise(pairs: PairRatios, n: int) -> FloatArray:
     """Return the deviation of the phase of an FRF of each channel, from the scatter of its ratios; 0 if unknown."""
-    scatter = _matrix(np.where(pairs.usable, pairs.scatter, 0.0), pairs, n)
-    count = (scatter > 0).sum(axis=1)
-    return np.asarray(scatter.sum(axis=1) / np.maximum(count, 1) / np.sqrt(4 * np.log(2)))
+    ends = np.concatenate([pairs.p[pairs.usable], pairs.q[pairs.usable]])
+    scatter = np.tile(pairs.scatter[pairs.usable], 2)
+    count = np.bincount(ends, minlength=n)
+    return np.asarray(np.bincount(ends, scatter, n) / np.maximum(count, 1) / np.sqrt(4 * np.log(2)))
 
 
 def _result(state: _Progress, freq: FloatArray, h: ComplexArray, good: np.ndarray, fix: Sequence[FrfFix]) -> FrfCheck:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.channels.check.pair_ratios import block_medians
+from jointfrf.channels.check.pair_ratios import block_medians, exponents
 from jointfrf.channels.check.result import Correction
 from jointfrf.channels.check.signals import Measurement, modulus
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA
@@ -17,7 +17,6 @@ from jointfrf.messages.finding import Finding
 
 __all__ = [
     "Sectors",
-    "circles",
     "convention_finding",
     "mean_exponent",
     "one_sidedness",
@@ -32,6 +31,8 @@ __all__ = [
 _ONE_SIDED = 0.3
 #: FRFs whose phase agrees better than this from line to line show circles.
 _CIRCLES_SEEN = 0.5
+#: Share of FRFs that run backwards from which all are conjugated.
+_BACKWARDS = 0.8
 #: Lines taken together.
 _BLOCK = 30
 #: Standard errors by which Im h / |h| of a block must exceed zero, and its least value.
@@ -52,26 +53,6 @@ _TAKEN_FOR = {
 }
 
 
-@dataclass(frozen=True)
-class Circles:
-    """The direction in which FRFs run through the complex plane.
-
-    Attributes
-    ----------
-    value : float
-        Median over FRFs of Im sum conj(h_k) h_k+1 / sum |h_k|^2: below zero for exp(+i w t); it is the time at which
-        the impulse response has its energy, in radians of the longest time that the lines resolve.
-    share : float
-        Share of FRFs that run backwards.
-    seen : int
-        Number of FRFs that are smooth enough.
-    """
-
-    value: float
-    share: float
-    seen: int
-
-
 @dataclass(frozen=True, eq=False)
 class Sectors:
     """The half plane in which each driving-point FRF lies.
@@ -79,8 +60,8 @@ class Sectors:
     Attributes
     ----------
     quarter : ndarray of int, shape (n,)
-        0: Im < 0, a receptance; 1: Re > 0, a mobility; 2: Im > 0, an accelerance or a receptance of the wrong sign;
-        3: Re < 0, a mobility of the wrong sign; -1: undecided.
+        0 is a receptance (Im < 0), 1 a mobility (Re > 0), 2 an accelerance or a receptance of the wrong sign (Im > 0),
+        3 a mobility of the wrong sign (Re < 0), -1 undecided.
     negative : ndarray, shape (n,)
         Share of the lines with Im < 0.
     """
@@ -89,27 +70,27 @@ class Sectors:
     negative: FloatArray
 
 
-def circles(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -> Circles:
-    """Find the direction of all FRFs, shape (n_freq, rows, columns), as the mean arrival time of their energy."""
+def convention_finding(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -> Finding | None:
+    """Report that most FRFs, shape (n_freq, rows, columns), run counterclockwise through the complex plane.
+
+    Im sum conj(h_k) h_k+1 is below zero for exp(+i w t): it is minus the mean arrival time of the energy of the impulse
+    response. FRFs count without their mean trend over frequency: otherwise a rigid-body line at the lowest frequencies
+    outweighs the resonances.
+    """
     use = smooth > max(_CIRCLES_SEEN, 6 / np.sqrt(h.shape[0]))
     if not use.any():
-        return Circles(0.0, 0.0, 0)
-    # Flattened, so that a rigid-body line at the lowest frequencies does not outweigh the resonances.
+        return None
     own = h[:, use]
     # About the middle of the band: in a narrow one the exponent is large, and powers of w overflow.
     own = own * (omega[:, None] / np.sqrt(omega.min() * omega.max())) ** -mean_exponent(omega, own)
-    size = (own.real**2 + own.imag**2).sum(axis=0)
-    turned = (own.real[:-1] * own.imag[1:] - own.imag[:-1] * own.real[1:]).sum(axis=0) / size
-    return Circles(float(np.median(turned)), float((turned > 0).mean()), int(use.sum()))
+    turned = (own.real[:-1] * own.imag[1:] - own.imag[:-1] * own.real[1:]).sum(axis=0)
+    share = float((turned > 0).mean())
+    return Finding("time-convention", {"share": share}) if share >= _BACKWARDS else None
 
 
 def mean_exponent(omega: FloatArray, h: ComplexArray) -> float:
     """Median over FRFs, shape (n_freq, m), of the exponent of w in |h|, by least squares."""
-    x = np.log(omega)
-    x = x - x.mean()
-    y = np.log(np.maximum(modulus(h), TINY))
-    spread = (x**2).sum()
-    return float(np.median(x @ y) / spread) if spread > 0 else 0.0
+    return float(np.median(exponents(omega, np.log(np.maximum(modulus(h), TINY)))))
 
 
 def sectors(driving: ComplexArray) -> Sectors:
@@ -146,13 +127,12 @@ def _on_real_axis(u: ComplexArray) -> NDArray[np.bool_]:
     return np.asarray((u**2).real.mean(axis=0) > 0)
 
 
-def passivity_findings(
-    measurement: Measurement, driving: ComplexArray, noise: FloatArray, inflation: float
-) -> Iterator[Finding]:
-    """Find driving points, shape (n_freq, n), whose Im is positive over a band.
+def passivity_findings(measurement: Measurement, noise: FloatArray, inflation: float) -> Iterator[Finding]:
+    """Find driving points whose Im is positive over a band.
 
     `noise` is the standard deviation of Im h / |h| on a line, shape (n,); NaN where it is not known.
     """
+    driving = measurement.driving
     length = min(_BLOCK, driving.shape[0])
     size = modulus(driving)
     part = np.where(size > 0, driving.imag / np.where(size > 0, size, 1), 0)
@@ -179,7 +159,7 @@ def passivity_findings(
 
 @dataclass(frozen=True, eq=False)
 class Quantities:
-    """What each DOF shows.
+    """Quantity and sign of each DOF.
 
     Attributes
     ----------
@@ -258,11 +238,6 @@ def quantities(
     return Quantities(found_power, found_sign, contradiction, exponent, certain)
 
 
-def convention_finding(around: Circles) -> Finding:
-    """Report that FRFs are conjugated."""
-    return Finding("time-convention", {"share": around.share})
-
-
 def quantity_findings(
     measurement: Measurement, found: Quantities, driving: Sectors, read_as: str | None
 ) -> Iterator[Finding | Correction]:
@@ -293,20 +268,18 @@ def quantity_findings(
 
 
 def _quantity_and_action(power: int, read_as: str | None) -> tuple[str, str]:
-    """Return which quantity FRFs are, that are (i w)^power times a receptance, and what to do.
+    """Return the quantity of FRFs that are (i w)^power times a receptance, and the remedy.
 
-    `read_as` is the quantity that all of them were taken for, where that is known.
+    `read_as` is the quantity as which all of them were read, if it is known.
     """
-    factor = ("i w", "(i w)^2")[abs(power) - 1]
-    does = f"Divide by {factor}" if power > 0 else f"Multiply by {factor}"
+    does = f"{'Divide' if power > 0 else 'Multiply'} by {('i w', '(i w)^2')[abs(power) - 1]}"
     actual = POWER_OF_I_OMEGA.get(read_as or "", -9) + power
-    if read_as is not None and 0 <= actual <= 2:
+    if 0 <= actual <= 2:
         quantity = _NAMES[actual] if power > 0 and read_as == "receptance" else f"{_NAMES[actual]} read as {read_as}"
         options = f"`--unit {_UNITS[actual]} --force-quantity` (`unit=`, `force_quantity=`)"
         return quantity, f"Read the file as {_NAMES[actual]}: {options}"
-    if read_as is not None:
-        return _NAMES[power] if power > 0 else _TAKEN_FOR[power], does
-    return _NAMES[power] if power > 0 else _TAKEN_FOR[power], f"{does}, or state the quantity when you read the file"
+    quantity = _NAMES[power] if power > 0 else _TAKEN_FOR[power]
+    return quantity, does if read_as is not None else f"{does}, or state the quantity when you read the file"
 
 
 def sign_findings(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from jointfrf.channels.check.signals import LEAST_SMOOTHNESS, modulus
 from jointfrf.frf.entry_groups import ZERO
 from jointfrf.frf.quantiles import medians
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
 __all__ = [
     "BROKEN",
@@ -21,6 +21,7 @@ __all__ = [
     "are_one_sided",
     "are_signals",
     "block_medians",
+    "exponents",
     "pair_ratios",
     "ratio_line",
     "scatter_of",
@@ -54,11 +55,11 @@ class RatioLine(NamedTuple):
     gain_error : ndarray, shape (n,)
         Standard error of the real part.
     slope, slope_error : ndarray, shape (n,)
-        Of the phase, s.
+        Slope of the phase and its standard error, s.
     at : ndarray, shape (n,)
-        rad/s.
+        Weighted mean of the angular frequency, rad/s.
     inflation : float
-        Variance of a mean over that of independent lines.
+        Variance of a mean, as a multiple of its variance with independent lines.
     """
 
     mean: ComplexArray
@@ -79,72 +80,55 @@ def ratio_line(omega: FloatArray, values: ComplexArray, turn: FloatArray, usable
     Parameters
     ----------
     omega : ndarray, shape (n_freq,)
+        Angular frequencies, rad/s.
     values : ndarray, shape (n_freq, n)
-        log(ratio) near 0: its phase without `turn`.
+        Logarithms of the ratios, with the phase `turn` taken out.
     turn : ndarray, shape (n,)
-        rad.
+        Phases, rad.
     usable : ndarray of bool, shape (n,)
-        Ratios that the correlation between lines is found from.
+        Ratios from which the correlation between lines is estimated.
 
     Notes
     -----
-    The phase at 0 Hz is that of a sign and of powers of i w. Where the data agree with that it is not fitted, which
-    halves the error of the slope or better.
+    A sign and powers of i w have a phase of 0, 90, 180 or 270 degrees at 0 Hz. If the data agree with one of these, the
+    phase at 0 Hz is not fitted, which halves the error of the slope or better.
 
-    Blocks of lines over which the scatter is averaged are longer than the noise is correlated: otherwise chance in a
+    The scatter is averaged over blocks of lines that are longer than the noise is correlated. Otherwise chance in a
     block would be taken for its noise level.
     """
-    fit = _fitted(omega, values, usable, _BLOCK)
-    longer = int(_APART * fit.inflation)
-    if longer > _BLOCK:
-        fit = _fitted(omega, values, usable, longer)
-    total, at, variance = fit.weight.sum(axis=0), fit.at, fit.variance
-    mean, slope = fit.mean + 1j * turn, fit.slope
+    block, longer = 0, _BLOCK
+    while longer > block:
+        is_first, block = block == 0, longer
+        deviation = _block_deviation(values, block)
+        weight, limit = deviation**-2, _CLIP * deviation
+        clipped = np.clip(values.real, -limit, limit) + 1j * np.clip(values.imag, -limit, limit)
+        total = weight.sum(axis=0)
+        mean = (weight * clipped).sum(axis=0) / total
+        at = (weight * omega[:, None]).sum(axis=0) / total
+        lever = omega[:, None] - at
+        inertia = (weight * lever**2).sum(axis=0)
+        slope = (weight * lever * clipped.imag).sum(axis=0) / inertia
+        residual = clipped - mean - 1j * lever * slope
+        inflation = _inflation((residual / deviation)[:, usable])
+        longer = int(_APART * inflation) if is_first else 0
+    # Variance of one line of weight 1, with the correlation.
+    scale = inflation / _lost(inflation, len(omega))
+    variance, phase_variance = ((weight * part**2).mean(axis=0) * scale for part in (residual.real, residual.imag))
+    mean = mean + 1j * turn
     start = mean.imag - at * slope
     start -= np.pi / 2 * np.rint(start / (np.pi / 2))
-    held = abs(start) < _SAME * np.sqrt(variance.imag * (1 / total + at**2 / fit.inertia))
-    moment = (fit.weight * omega[:, None] ** 2).sum(axis=0)
-    # The least squares with start = 0, from those of the free line.
+    held = abs(start) < _SAME * np.sqrt(phase_variance * (1 / total + at**2 / inertia))
+    moment = (weight * omega[:, None] ** 2).sum(axis=0)
+    # Least squares with start = 0, from the estimates of the free line.
     change = np.where(held, at * total * start / moment, 0)
-    inertia = np.where(held, moment, fit.inertia)
     return RatioLine(
         mean=mean - 1j * np.where(held, start - at * change, 0),
-        gain_error=np.hypot(np.sqrt(variance.real / total), LEAST_ERROR),
+        gain_error=np.hypot(np.sqrt(variance / total), LEAST_ERROR),
         slope=slope + change,
-        slope_error=np.hypot(np.sqrt(variance.imag / inertia), LEAST_ERROR / omega[-1]),
+        slope_error=np.hypot(np.sqrt(phase_variance / np.where(held, moment, inertia)), LEAST_ERROR / omega[-1]),
         at=at,
-        inflation=fit.inflation,
+        inflation=inflation,
     )
-
-
-class _Fitted(NamedTuple):
-    """Free line; the variance of real and imaginary part is that of one line of weight 1, with the correlation."""
-
-    weight: FloatArray
-    at: FloatArray
-    mean: ComplexArray
-    slope: FloatArray
-    inertia: FloatArray
-    variance: ComplexArray
-    inflation: float
-
-
-def _fitted(omega: FloatArray, values: ComplexArray, usable: NDArray[np.bool_], block: int) -> _Fitted:
-    deviation = _block_deviation(values, block)
-    weight = deviation**-2
-    clipped = _clipped(values, deviation)
-    total = weight.sum(axis=0)
-    mean = (weight * clipped).sum(axis=0) / total
-    at = (weight * omega[:, None]).sum(axis=0) / total
-    lever = omega[:, None] - at
-    inertia = (weight * lever**2).sum(axis=0)
-    slope = (weight * lever * clipped.imag).sum(axis=0) / inertia
-    left = clipped - mean - 1j * lever * slope
-    # The phase left by a delay is not noise: it was removed before.
-    inflation = _inflation((left / deviation)[:, usable])
-    lost = _lost(inflation, len(omega))
-    real, imaginary = ((weight * part**2).mean(axis=0) * inflation / lost for part in (left.real, left.imag))
-    return _Fitted(weight, at, mean, slope, inertia, real + 1j * imaginary, inflation)
 
 
 def block_medians(values: FloatArray, length: int = _BLOCK) -> FloatArray:
@@ -163,11 +147,6 @@ def _block_deviation(rest: ComplexArray, length: int) -> FloatArray:
     squares = np.maximum(squares, 0.01 * medians(squares.T) + LEAST_ERROR**2)
     place = np.minimum(np.arange(rest.shape[0]) // length, squares.shape[0] - 1)
     return np.asarray(np.sqrt(squares)[place])
-
-
-def _clipped(rest: ComplexArray, deviation: FloatArray) -> ComplexArray:
-    limit = _CLIP * deviation
-    return np.clip(rest.real, -limit, limit) + 1j * np.clip(rest.imag, -limit, limit)
 
 
 def _inflation(standard: ComplexArray) -> float:
@@ -194,13 +173,13 @@ def _lost(inflation: float, n_freq: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class PairRatios:
-    """What is known of h_pq / h_qp = gain (i w)^power exp(i phase - i w delay), for pairs p < q.
+    """Estimates of h_pq / h_qp = gain (i w)^power exp(i phase - i w delay), for pairs p < q.
 
     Attributes
     ----------
     p, q : ndarray of int, shape (n_pairs,)
     usable : ndarray of bool
-        Pairs whose ratio is constant but for power, delay and noise.
+        Pairs whose ratio is constant, apart from power, delay and noise.
     broken : ndarray of bool
         Pairs of two signals that are not the same FRF.
     power : ndarray of int
@@ -213,7 +192,7 @@ class PairRatios:
     scatter : ndarray
         Median of |log(ratio / model)| over lines.
     inflation : float
-        Variance of a mean over that of independent lines.
+        Variance of a mean, as a multiple of its variance with independent lines.
     """
 
     p: NDArray[np.intp]
@@ -306,7 +285,7 @@ class Polar(NamedTuple):
 
     @classmethod
     def of(cls, h: ComplexArray) -> Polar:
-        """Return those of h, shape (n_freq, ...)."""
+        """Return sizes and phases of h, shape (n_freq, ...)."""
         size = modulus(h)
         zero = size == 0
         size = np.where(zero, 1, size)
@@ -332,14 +311,14 @@ class Polar(NamedTuple):
         return amplitude, phasor
 
 
-def scatter_of(above: Polar, below: Polar) -> FloatArray:
-    """Median over lines of |log(above / below) - constant|: below `BROKEN` where they are one FRF up to a factor."""
+def scatter_of(above: Polar, below: Polar) -> tuple[FloatArray, FloatArray]:
+    """Return the median over lines of |log(above / below) - constant|, and the real part of the constant."""
     amplitude, phasor = above.over(below)
-    rest = amplitude - medians(amplitude.T).T
+    middle = medians(amplitude.T).T
     turn = np.angle(phasor * _unit(phasor.sum(axis=0)).conj())
-    scatter: FloatArray = medians(np.sqrt(rest**2 + turn**2).T).T
+    scatter: FloatArray = medians(np.sqrt((amplitude - middle) ** 2 + turn**2).T).T
     one_is_zero = (above.zero != below.zero).mean(axis=0) > 0.5
-    return np.where(one_is_zero, ONE_SIDED, scatter)
+    return np.where(one_is_zero, ONE_SIDED, scatter), middle
 
 
 def _unit(values: ComplexArray) -> ComplexArray:
@@ -348,26 +327,22 @@ def _unit(values: ComplexArray) -> ComplexArray:
 
 
 def _delays(omega: FloatArray) -> tuple[FloatArray, ComplexArray]:
-    """Delays to try, s, and exp(i w delay), shape (n_delays, n_freq)."""
-    step = np.pi / (omega[-1] - omega[0])
-    steps = step * np.arange(-_STEPS, _STEPS + 1)
-    once = np.exp(1j * omega * step)
-    turns = np.empty((steps.size, omega.size), complex)
-    turns[0] = once ** (-_STEPS)
-    for i in range(1, steps.size):
-        turns[i] = turns[i - 1] * once
-    return steps, turns
+    """Return delays to try, s, and exp(i w delay), shape (n_delays, n_freq)."""
+    steps = np.pi / (omega[-1] - omega[0]) * np.arange(-_STEPS, _STEPS + 1)
+    return steps, np.exp(1j * np.outer(steps, omega))
+
+
+def exponents(omega: FloatArray, log_size: FloatArray) -> FloatArray:
+    """Return the exponents of w in sizes with these logarithms, shape (n_freq, ...), by least squares."""
+    x = np.log(omega)
+    x = x - x.mean()
+    return np.asarray(x @ log_size / max(float(x @ x), TINY))
 
 
 def _powers(omega: FloatArray, amplitude: FloatArray) -> NDArray[np.intp]:
     """Exponent of w in each ratio, from -2 to 2, where this explains it better than a constant."""
-    x, y = block_medians(np.log(omega)[:, None]), block_medians(amplitude)
-    x, y = x - x.mean(), y - y.mean(axis=0)
-    spread = (x**2).sum()
-    if spread == 0:
-        return np.zeros(y.shape[1], np.intp)
-    slope = (x * y).sum(axis=0) / spread
+    x, y = block_medians(np.log(omega)[:, None])[:, 0], block_medians(amplitude)
+    slope = exponents(np.exp(x), y)
     power = np.clip(np.rint(slope), -2, 2)
-    left = ((y - slope * x) ** 2).sum(axis=0)
-    explained = (abs(slope - power) < 0.3) & (left < 0.1 * (y**2).sum(axis=0))
+    explained = (abs(slope - power) < 0.3) & (np.var(y - np.outer(x, slope), axis=0) < 0.1 * np.var(y, axis=0))
     return np.where(explained, power, 0).astype(np.intp)

@@ -1,19 +1,18 @@
-"""Complex numbers that were put together wrongly: phases in radians or without sign, magnitudes in decibels.
+"""Complex numbers from wrong parts: phases in radians or without sign, magnitudes in decibels.
 
-They come before all other checks, which see consequences of them in every channel.
+This check precedes all other ones, which would report its consequences in every channel.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.channels.check.signals import modulus
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.messages.finding import Finding
 
 __all__ = ["representation_finding"]
@@ -39,14 +38,14 @@ _LEAST_FRFS = 2
 def representation_finding(
     freq_hz: FloatArray, h: ComplexArray, missing: NDArray[np.bool_], read_as: str | None
 ) -> Finding | None:
-    """Return what is wrong with magnitudes or phases of all FRFs; None if nothing is.
+    """Report wrong magnitudes or phases of all FRFs; None if they are right.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
         Positive, Hz.
     h : ndarray, shape (n_freq, n_responses, n_forces)
-        Receptances, m/N; finite but for those that are missing.
+        Receptances, m/N, finite unless they are missing.
     missing : ndarray of bool, shape (n_responses, n_forces)
         FRFs that are not used.
     read_as : str, optional
@@ -54,25 +53,37 @@ def representation_finding(
 
     Notes
     -----
-    The FRFs of one force are looked at together: all of them at once would take the memory of the FRFs many times.
+    The FRFs of one force are summarised together: all of them at once would take the memory of the FRFs many times.
     """
     factor = ((2j * np.pi * freq_hz) ** POWER_OF_I_OMEGA.get(read_as or "receptance", 0))[:, None]
-    found = [
-        _Summary.of(own[:, (own != 0).all(axis=0)])
-        for force in range(h.shape[2])
-        if (own := np.asarray(h[:, ~missing[:, force], force] * factor)).size
-    ]
-    found = [one for one in found if one.n_frfs]
-    return _phase_unit(found) or _decibel(found) or _unsigned(found)
+    found = []
+    for force in range(h.shape[2]):
+        own = h[:, ~missing[:, force], force] * factor
+        own = own[:, (own != 0).all(axis=0)]
+        if own.size:
+            found.append(_summary(own))
+    if not found:
+        return None
+    every = _Summary(*(np.array(values) for values in zip(*found, strict=True)))
+    largest = float(every.largest_degrees.max())
+    if largest <= np.pi * (1 + 1e-6) and every.has_peak.any():
+        return Finding("phase-unit", {"largest": largest})
+    if every.is_flat.all() and every.half_turns.max() >= _HALF_TURNS:
+        return Finding("decibel", {"low": float(every.low.min()), "high": float(every.high.max())})
+    has_both_signs = every.has_negative.any() and every.has_positive.any()
+    turns = float(every.forward.sum()), float(every.back.sum())
+    if has_both_signs or every.n_frfs.sum() < _LEAST_FRFS or min(turns) <= _EITHER_WAY * sum(turns):
+        return None
+    return Finding("unsigned-phase", {"share": min(turns) / sum(turns)})
 
 
 class _Summary(NamedTuple):
-    """Statistics of some FRFs.
+    """Statistics of the FRFs of one force, or arrays of them for all forces.
 
     Attributes
     ----------
     n_frfs : int
-        FRFs.
+        Number of FRFs.
     largest_degrees : float
         Largest modulus of a phase.
     has_peak, is_flat, has_positive, has_negative : bool
@@ -84,39 +95,37 @@ class _Summary(NamedTuple):
         Turn of the FRFs in the complex plane either way, in units of the whole turn of each FRF.
     """
 
-    n_frfs: int
-    largest_degrees: float = 0.0
-    has_peak: bool = False
-    is_flat: bool = False
-    has_positive: bool = False
-    has_negative: bool = False
-    low: float = 0.0
-    high: float = 0.0
-    half_turns: float = 0.0
-    forward: float = 0.0
-    back: float = 0.0
+    n_frfs: NDArray[np.intp]
+    largest_degrees: FloatArray
+    has_peak: NDArray[np.bool_]
+    is_flat: NDArray[np.bool_]
+    has_positive: NDArray[np.bool_]
+    has_negative: NDArray[np.bool_]
+    low: FloatArray
+    high: FloatArray
+    half_turns: FloatArray
+    forward: FloatArray
+    back: FloatArray
 
-    @classmethod
-    def of(cls, h: ComplexArray) -> _Summary:
-        """Summarise FRFs, shape (n_freq, n)."""
-        if not h.size:
-            return cls(0)
-        size, angle = modulus(h), np.angle(h)
-        low, high = np.quantile(size, _MOST, axis=0)
-        forward, back = _turns(h)
-        return cls(
-            h.shape[1],
-            float(np.degrees(abs(angle).max())),
-            bool(_has_peak(size).any()),
-            bool(((np.median(size, axis=0) > _LEAST_DECIBEL) & (high < _FLAT * low)).all()),
-            bool((h.imag > 0).any()),
-            bool((h.imag < 0).any()),
-            float(low.min()),
-            float(high.max()),
-            float((np.ptp(np.unwrap(angle, axis=0), axis=0) / np.pi).max()),
-            forward,
-            back,
-        )
+
+def _summary(h: ComplexArray) -> tuple[Any, ...]:
+    """Return the fields of `_Summary` for FRFs, shape (n_freq, n)."""
+    size, angle = modulus(h), np.angle(h)
+    low, high = np.quantile(size, _MOST, axis=0)
+    before = np.minimum.accumulate(size, axis=0)
+    after = np.minimum.accumulate(size[::-1], axis=0)[::-1]
+    return (
+        h.shape[1],
+        np.degrees(abs(angle).max()),
+        (size > _RISE * np.maximum(before, after)).any(),
+        ((np.median(size, axis=0) > _LEAST_DECIBEL) & (high < _FLAT * low)).all(),
+        (h.imag > 0).any(),
+        (h.imag < 0).any(),
+        low.min(),
+        high.max(),
+        (np.ptp(np.unwrap(angle, axis=0), axis=0) / np.pi).max(),
+        *_turns(h),
+    )
 
 
 def _turns(h: ComplexArray) -> tuple[float, float]:
@@ -128,37 +137,5 @@ def _turns(h: ComplexArray) -> tuple[float, float]:
     # standard error by successive differences, which a smooth turn hardly enters
     error = np.sqrt((np.diff(whole, axis=1) ** 2).sum(axis=1) / 2)
     total = np.where(abs(total) > _SIGNIFICANT * error, total, 0.0)
-    total = total / np.maximum(abs(total).sum(axis=0), np.finfo(float).tiny)
+    total = total / np.maximum(abs(total).sum(axis=0), TINY)
     return float(np.maximum(total, 0).sum()), float(np.maximum(-total, 0).sum())
-
-
-def _has_peak(size: FloatArray) -> NDArray[np.bool_]:
-    """Return which FRFs, shape (n_freq, n), rise and fall again, as at a resonance."""
-    before = np.minimum.accumulate(size, axis=0)
-    after = np.minimum.accumulate(size[::-1], axis=0)[::-1]
-    return np.asarray((size > _RISE * np.maximum(before, after)).any(axis=0))
-
-
-def _phase_unit(found: Sequence[_Summary]) -> Finding | None:
-    """Find phases in radians that were read as degrees: within +-pi degrees, across resonances."""
-    largest = max((one.largest_degrees for one in found), default=np.inf)
-    is_wrong = largest <= np.pi * (1 + 1e-6) and any(one.has_peak for one in found)
-    return Finding("phase-unit", {"largest": largest}) if is_wrong else None
-
-
-def _decibel(found: Sequence[_Summary]) -> Finding | None:
-    """Find magnitudes in decibels that were read as linear: large and flat, while the phase turns."""
-    if not found or not all(one.is_flat for one in found) or max(one.half_turns for one in found) < _HALF_TURNS:
-        return None
-    return Finding("decibel", {"low": min(one.low for one in found), "high": max(one.high for one in found)})
-
-
-def _unsigned(found: Sequence[_Summary]) -> Finding | None:
-    """Find phases without their sign: no line of any FRF has the other sign, yet FRFs turn both ways."""
-    both = any(one.has_negative for one in found) and any(one.has_positive for one in found)
-    if both or sum(one.n_frfs for one in found) < _LEAST_FRFS:
-        return None
-    forward, back = sum(one.forward for one in found), sum(one.back for one in found)
-    if min(forward, back) <= _EITHER_WAY * (forward + back):
-        return None
-    return Finding("unsigned-phase", {"share": min(forward, back) / (forward + back)})

@@ -8,10 +8,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.channels.check.pair_ratios import exponents
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.messages.finding import Finding
 
-__all__ = ["LEAST_MODES", "Resonances", "driving_point_findings", "resonances", "signs_at", "strength_exponent"]
+__all__ = [
+    "LEAST_MODES",
+    "Resonances",
+    "driving_point_findings",
+    "fit_poles",
+    "resonances",
+    "signs_at",
+    "strength_exponent",
+]
 
 #: A peak is the largest line among so many on either side, and rises by this factor above the median of more of them.
 _NEAR, _AROUND, _RISE = 8, 60, 4.0
@@ -30,6 +39,9 @@ _CLEAR, _LEAST = 3.0, 0.1
 _REAL = np.pi / 4
 #: Least number of modes from which signs, or the growth of residues with frequency, are judged; how far they spread.
 LEAST_MODES, _SPAN = 3, 3.0
+#: Steps of the search for a pole, and change, in halves of the band of the peak, at which it is found: it is of third
+#: order in the residual of the further powers.
+_STEPS, _FOUND = 15, 1e-4
 #: Peaks that are fitted at most, and sensors that a finding proposes.
 _MOST, _PROPOSED = 30, 3
 
@@ -95,9 +107,7 @@ def strength_exponent(found: Resonances) -> float | None:
     """
     if found.freq_hz.size < LEAST_MODES or found.freq_hz.max() < _SPAN * found.freq_hz.min():
         return None
-    x = np.log(found.freq_hz)
-    x = x - x.mean()
-    return float(x @ np.log(np.maximum(found.strength, TINY)) / (x @ x))
+    return float(exponents(found.freq_hz, np.log(np.maximum(found.strength, TINY))))
 
 
 def signs_at(found: Resonances) -> NDArray[np.intp]:
@@ -179,32 +189,72 @@ def _half_width(size: FloatArray, peak: int) -> float:
 def _fitted(
     freq_hz: FloatArray, h: ComplexArray, peak: float, width: float
 ) -> tuple[float, float, ComplexArray] | None:
-    """Return frequency, loss factor and residues of one mode with a parabola beside it; None where that fits badly."""
-    omega = 2 * np.pi * freq_hz
-    x = (freq_hz - peak) / max(np.ptp(freq_hz), TINY)
-    rest = np.stack([np.ones_like(x), x, x**2], axis=1)
-    if len(x) < 2 * _LEAST_LINES - 2 or width > _WIDEST * peak:
+    """Return frequency, loss factor and residues of one mode with a parabola; None if they do not fit."""
+    half, middle = np.ptp(freq_hz) / 2, (freq_hz[0] + freq_hz[-1]) / 2
+    varied = h - h.mean(axis=0)
+    size = float(np.linalg.norm(varied))
+    if len(freq_hz) < 2 * _LEAST_LINES - 2 or width > _WIDEST * peak or not size > 0:
         return None
-
-    def parts(p: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        pole = (2 * np.pi * (peak + p[0] * width)) ** 2 * (1 + 1j * np.exp(p[1]))
-        basis = np.column_stack([1 / (pole - omega**2), rest])
-        scale = np.linalg.norm(basis, axis=0)
-        weights = np.linalg.lstsq(basis / scale, h, rcond=None)[0] / scale[:, None]
-        return h - basis @ weights, weights[0]
-
-    def residual(p: FloatArray) -> FloatArray:
-        left = (parts(p)[0] / size).ravel()
-        return np.concatenate([left.real, left.imag])
-
-    size = float(np.linalg.norm(h - h.mean(axis=0)))
-    if not size > 0:
+    x = (freq_hz - middle) / half
+    found = fit_poles(x, varied / size, np.array([(peak - middle + 0.5j * width) / half]))
+    if found is None or found[2] > _LEFT:
         return None
-    start = np.array([0.0, np.log(width / peak)])
-    from scipy import optimize  # only here: it takes long to import
+    pole = middle + half * complex(found[0][0])
+    # 1 / (p^2 - w^2) is 1 / (2 p (p - w)) and a smooth function
+    residues = -2 * pole * (2 * np.pi) ** 2 * half * size * found[1][0]
+    square = pole**2
+    return float(np.sqrt(square.real)), square.imag / square.real, residues
 
-    found = optimize.least_squares(residual, start, bounds=([-2, start[1] - 4], [2, start[1] + 2]), max_nfev=40)
-    left, weights = parts(found.x)
-    if np.linalg.norm(left) > _LEFT * size:
-        return None
-    return peak + float(found.x[0]) * width, float(np.exp(found.x[1])), weights
+
+def fit_poles(x: FloatArray, h: ComplexArray, poles: ComplexArray) -> tuple[ComplexArray, ComplexArray, float] | None:
+    """Fit poles that all FRFs share, and a parabola for each FRF, by Gauss-Newton steps.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n_freq,)
+        Frequency, -1 to 1.
+    h : ndarray, shape (n_freq, n)
+        FRFs.
+    poles : ndarray, shape (n_poles,)
+        Initial values.
+
+    Returns
+    -------
+    tuple or None
+        Poles z, residues of 1 / (x - z), shape (n_poles, n), and norm of the residual. None if the poles are not
+        causal, or the first one is outside the band.
+    """
+    n = len(poles)
+    residues: ComplexArray = np.zeros((n, h.shape[1]), np.complex128)
+    parabola: FloatArray = np.linalg.qr(x[:, None] ** np.arange(3))[0]
+    h = h - parabola @ (parabola.T @ h)
+    for _ in range(_STEPS):
+        near = 1 / (x[:, None] - poles)
+        q, r = _orthonormal(near - parabola @ (parabola.T @ near))
+        if not abs(np.diagonal(r)).min() > TINY:
+            return None
+        inside = q.conj().T @ h
+        residues = np.asarray(np.linalg.solve(r, inside), np.complex128)
+        # The slope of h by a pole is its residues times 1 / (x - z)^2, less what parabola and poles explain of that.
+        slopes = near**2
+        left = h - q @ inside
+        descent = np.sum(slopes.conj() * (left @ residues.conj().T), axis=0)
+        slopes -= parabola @ (parabola.T @ slopes)
+        slopes -= q @ (q.conj().T @ slopes)
+        normal = (slopes.conj().T @ slopes) * (residues.conj() @ residues.T)
+        step = np.linalg.solve(normal + TINY * np.eye(n), descent)
+        step *= min(1.0, 0.5 * float(np.min(poles.imag / np.maximum(abs(step), TINY))))
+        poles = poles + step
+        if abs(step).max() < _FOUND:
+            break
+    is_valid = (poles.imag > 0).all() and abs(poles[0].real) < 1
+    return (poles, residues, float(np.linalg.norm(left))) if is_valid else None
+
+
+def _orthonormal(columns: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    """Return an orthonormal basis of columns and their triangle: `numpy.linalg.qr`, which is slow for one column."""
+    if columns.shape[1] > 1:
+        q, r = np.linalg.qr(columns)
+        return q, r
+    size = max(float(np.linalg.norm(columns)), TINY)
+    return columns / size, np.full((1, 1), size + 0j)

@@ -28,7 +28,7 @@ class FrfCheck:
     h : ndarray, shape (n_freq, n_responses, n_forces)
         The FRFs as given, with the corrections that `fix` asked for.
     changes : tuple of str
-        What was corrected.
+        Corrections that were made.
     unseen : str
         Errors that no check of these FRFs can detect.
     """
@@ -41,7 +41,7 @@ class FrfCheck:
 
     @property
     def ok(self) -> bool:
-        """Whether there is neither an error nor a warning."""
+        """Whether all findings are notes."""
         return all(finding.severity == "note" for finding in self.findings)
 
     @property
@@ -74,7 +74,7 @@ class Correction:
     fix : str
         The word of `fix` that asks for it.
     text : str
-        What it does.
+        Description of the change.
     axis : {1, 2}
         Responses or forces.
     places : tuple of int

@@ -1,21 +1,22 @@
-"""What a channel shows that the others around its virtual point do not expect: sign, factor, direction, place."""
+"""Errors of channels around a virtual point: sign, factor, quantity, delay, direction, place."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from jointfrf.channels.check.channel_ratios import unit_of_factor
+from jointfrf.channels.check.pair_ratios import exponents
 from jointfrf.channels.check.rigid_motion import ChannelGroup, Suspects, column_size, expected_motion, find_suspects
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.messages.finding import Finding
 from jointfrf.messages.message import Severity
 
-__all__ = ["RigidFault", "rigid_faults"]
+__all__ = ["rigid_faults"]
 
 #: Mean square that a suspect causes over that of the others, from which it is one: of bodies without a fault, whose
 #: deformation is no rigid motion either, 8 is exceeded in a third of the groups, 25 in one of 300 with four residuals
@@ -43,15 +44,6 @@ _TURNS, _STEPS = 2.0, 81
 _MOST_FAULTS = 3
 
 
-@dataclass(frozen=True)
-class RigidFault:
-    """One finding about channels of a group, and which rows or columns it is about."""
-
-    finding: Finding
-    word: str
-    places: tuple[int, ...]
-
-
 @dataclass(frozen=True, eq=False)
 class _Seen:
     """What a channel shows beside what the others expect at its place.
@@ -73,16 +65,20 @@ class _Seen:
 
     @property
     def expected(self) -> ComplexArray:
-        """What it should show, shape (n_freq, n)."""
+        """Expected motion of the channel, shape (n_freq, n)."""
         return np.asarray(np.einsum("a,fan->fn", self.direction, self.place))
 
+    def on(self, lines: np.ndarray) -> _Seen:
+        """Return the motions on some lines."""
+        return replace(self, freq_hz=self.freq_hz[lines], shown=self.shown[lines], place=self.place[lines])
+
     def error(self) -> float:
-        """Root mean square of shown less expected, over that of the expected."""
+        """Root mean square of the difference, relative to the expected motion."""
         expected = self.expected
         return _size(self.shown - expected) / max(_size(expected), TINY)
 
     def fitted(self) -> tuple[FloatArray, float]:
-        """Return the direction times factor that explains most of what it shows, and the share that is left."""
+        """Return the direction times factor that explains most of the shown motion, and the share of the residual."""
         across = self.place.swapaxes(0, 1).reshape(3, -1)
         both = np.hstack([across.real, across.imag]).T
         shown = np.concatenate([self.shown.real.ravel(), self.shown.imag.ravel()])
@@ -91,7 +87,7 @@ class _Seen:
         return direction, left / max(float(np.linalg.norm(shown)), TINY)
 
     def share_left(self, expected: ComplexArray) -> float:
-        """Return the share of what it shows that another expected motion leaves."""
+        """Return the residual of another expected motion as a share of the shown motion."""
         return _size(self.shown - expected) / max(_size(self.shown), TINY)
 
 
@@ -99,15 +95,22 @@ def _size(values: ComplexArray) -> float:
     return float(np.linalg.norm(values))
 
 
-def rigid_faults(group: ChannelGroup, freq_hz: FloatArray, names: Sequence[str]) -> Iterator[RigidFault]:
-    """Find the channels that do not move as the others around the point expect, one cause after the other.
+def rigid_faults(group: ChannelGroup, freq_hz: FloatArray, names: Sequence[str]) -> Iterator[tuple[Finding, list[int]]]:
+    """Find the channels that do not share the rigid motion of their neighbours, one cause at a time.
 
     Parameters
     ----------
     group : ChannelGroup
+        Responses or forces of one side.
     freq_hz : ndarray, shape (n_freq,)
+        Frequencies, Hz.
     names : sequence of str
-        Of its channels.
+        Names of its channels.
+
+    Yields
+    ------
+    tuple
+        Finding, and the rows or columns of its channels.
     """
     left = np.arange(group.size)
     for _ in range(_MOST_FAULTS):
@@ -119,35 +122,32 @@ def rigid_faults(group: ChannelGroup, freq_hz: FloatArray, names: Sequence[str])
         if finding is None:
             return
         bad = left[list(suspects.channels)]
-        yield RigidFault(finding, group.word, tuple(group.places[bad].tolist()))
+        yield finding, group.places[bad].tolist()
         left = np.setdiff1d(left, bad)
 
 
 def _finding(group: ChannelGroup, suspects: Suspects, freq_hz: FloatArray, names: Sequence[str]) -> Finding | None:
     others = np.setdiff1d(np.arange(group.size), suspects.channels)
     motion = expected_motion(group, others)
-    seen = [_seen(group, i, motion, freq_hz) for i in suspects.channels]
-    some = [_on_lines(one, suspects.lines) for one in seen]
+    size = column_size(group.h)
+    # The motion of the others at the place of each suspect; every column has the same weight on every line.
+    seen = [
+        _Seen(freq_hz, group.h[:, i] / size, group.at(group.positions[i]) @ motion / size[:, None], group.directions[i])
+        for i in suspects.channels
+    ]
+    some = [one.on(suspects.lines) for one in seen]
     if suspects.kind == "channel":
         return _channel_finding(group, suspects, seen[0], some[0], names, motion)
     error = math.sqrt(sum(one.error() ** 2 for one in some) / len(some))
     if suspects.ratio < _CLEAR_RATIO or error < _SENSOR_ERROR:
         return None
+    numbers, about = _beside(group, suspects, error), tuple(f"{group.word} {names[i]}" for i in suspects.channels)
     if suspects.kind == "exchanged":
-        names_of = tuple(f"{group.word} {names[i]}" for i in suspects.channels)
-        return Finding("exchanged-channels", _beside(group, suspects, error), names_of, variant="neighbours")
-    return _sensor_finding(group, suspects, some, names, error)
-
-
-def _seen(group: ChannelGroup, i: int, motion: ComplexArray, freq_hz: FloatArray) -> _Seen:
-    """Relate a channel to the motion of the others; every column with the same weight on every line."""
-    size = column_size(group.h)
-    place = np.einsum("ab,fbn->fan", group.at(group.positions[i]), motion) / size[:, None]
-    return _Seen(freq_hz, group.h[:, i] / size, place, group.directions[i])
-
-
-def _on_lines(one: _Seen, lines: np.ndarray) -> _Seen:
-    return _Seen(one.freq_hz[lines], one.shown[lines], one.place[lines], one.direction)
+        return Finding("exchanged-channels", numbers, about, variant="neighbours")
+    turned = _turned(some)
+    if turned is not None:
+        return Finding("channel-direction", numbers | {"shown": turned}, about, variant="sensor")
+    return Finding("channel-place", numbers, about, variant="sensor")
 
 
 def _beside(group: ChannelGroup, suspects: Suspects, error: float) -> dict[str, Any]:
@@ -156,7 +156,7 @@ def _beside(group: ChannelGroup, suspects: Suspects, error: float) -> dict[str, 
 
 
 class _Cause(NamedTuple):
-    """What is wrong with a channel: code and variant of the finding, and its numbers."""
+    """Error of a channel: code and variant of the finding, and its numbers."""
 
     code: str
     numbers: Mapping[str, Any]
@@ -167,54 +167,67 @@ class _Cause(NamedTuple):
 def _channel_finding(
     group: ChannelGroup, suspects: Suspects, seen: _Seen, some: _Seen, names: Sequence[str], motion: ComplexArray
 ) -> Finding | None:
-    """Say what is wrong with one channel; None where the deformation of the side may be the reason."""
+    """Report the error of one channel; None if the deformation of the side may be the reason."""
     place = suspects.channels[0]
     error = some.error()
     direction, left = some.fitted()
     other, after = _like_another(group, place, some, motion, suspects.lines)
-    # shares of what it shows, as the error is one of what is expected
+    # Shares of the shown motion become shares of the expected one, as the error is.
     scale = _size(some.shown) / max(_size(some.expected), TINY)
-    explained = left * scale <= _EXPLAINED * error
     copied = after * scale <= _EXPLAINED * error and after < left
-    if error < _NOTICED or (not explained and not copied and error < _LARGE):
+    is_explained = copied or left * scale <= _EXPLAINED * error
+    if error < _NOTICED or not (is_explained or error >= _LARGE):
         return None
-    cause = _cause_in_time(group, seen)
-    if cause is None and not copied and left < _HALF:
-        cause = _of_direction(group, some.direction, direction, left)
-    if cause is None and not copied:
-        cause = _late(seen)
-    if cause is None and (copied or after < 0.5):
-        cause = _Cause("channel-place", {"other": f"{group.word} {names[other]}"}, "copy")
-    if cause is None and error >= _LARGE and suspects.ratio >= _CLEAR_RATIO:
-        cause = _Cause("channel-place", {}, "")
-    if cause is None:
-        return None
-    numbers = _beside(group, suspects, error) | dict(cause.numbers)
-    return Finding(cause.code, numbers, (f"{group.word} {names[place]}",), (), cause.severity, cause.variant)
+    causes = [_quantity(group.word, seen)]
+    if not copied:
+        causes += [_of_direction(some.direction, direction, left) if left < _HALF else None, _late(seen)]
+    if copied or after < 0.5:
+        causes.append(_Cause("channel-place", {"other": f"{group.word} {names[other]}"}, "copy"))
+    if error >= _LARGE and suspects.ratio >= _CLEAR_RATIO:
+        causes.append(_Cause("channel-place", {}, ""))
+    for cause in causes:
+        if cause is not None:
+            numbers = _beside(group, suspects, error) | dict(cause.numbers)
+            return Finding(cause.code, numbers, (f"{group.word} {names[place]}",), (), cause.severity, cause.variant)
+    return None
 
 
-def _cause_in_time(group: ChannelGroup, seen: _Seen) -> _Cause | None:
-    """Say whether a channel is another quantity than the others."""
-    power = _power(seen)
-    if not power:
+def _quantity(word: str, seen: _Seen) -> _Cause | None:
+    """Return the power of i w by which a channel differs from its expected motion."""
+    n, expected, shown = seen.freq_hz.size, seen.expected, seen.shown
+    first = np.linspace(0, n, min(_PARTS, n), endpoint=False).astype(int)
+    lines = (expected.conj() * shown, abs(expected) ** 2, abs(shown) ** 2)
+    product, power_of_expected, power_of_shown = (np.add.reduceat(one.sum(axis=1), first) for one in lines)
+    coherent = abs(product) > _COHERENT * np.maximum(np.sqrt(power_of_expected * power_of_shown), TINY)
+    ratio = product[coherent] / power_of_expected[coherent]
+    middle = (np.add.reduceat(seen.freq_hz, first) / np.diff(first, append=n))[coherent]
+    if middle.size < 3 or middle[-1] < _SPAN * middle[0]:
         return None
-    word = {2: "an acceleration", 1: "a velocity", -1: "divided by i w once", -2: "divided by i w twice"}[power]
-    if group.word == "force":
-        word = f"(i w)^{power} times a force"
-    numbers = {"quantity": f"{word} among other quantities", "action": "Convert it like the other channels"}
-    return _Cause("quantity", numbers)
+    slope = float(exponents(middle, np.log(abs(ratio))))
+    power = round(slope)
+    if not 1 <= abs(power) <= 2 or abs(slope - power) > _EXPONENT:
+        return None
+    if (ratio / abs(ratio) * (-1j) ** power).mean().real <= _COHERENT:
+        return None
+    what = {2: "an acceleration", 1: "a velocity", -1: "divided by i w once", -2: "divided by i w twice"}[power]
+    if word == "force":
+        what = f"(i w)^{power} times a force"
+    action = "Convert it like the other channels"
+    return _Cause("quantity", {"quantity": f"{what} among other quantities", "action": action})
 
 
 def _late(seen: _Seen) -> _Cause | None:
-    """Say whether a channel is late, by more than the deformation of sides turns phases."""
-    delay, left = _delay(seen)
-    if left >= _EXPLAINED:
+    """Return the delay of a channel, if the delay explains more than the deformation of sides turns phases."""
+    omega = 2 * np.pi * seen.freq_hz
+    product = (seen.expected.conj() * seen.shown).sum(axis=1)
+    tried = np.linspace(-1, 1, _STEPS) * _TURNS * 2 * np.pi / omega[-1]
+    delay = float(tried[np.argmax((np.exp(1j * np.outer(tried, omega)) @ product).real)])
+    if seen.share_left(np.exp(-1j * omega * delay)[:, None] * seen.expected) >= _EXPLAINED:
         return None
-    way = "late" if delay > 0 else "early"
-    return _Cause("channel-delay", {"way": way, "delay": 1e6 * abs(delay)}, severity="error")
+    return _Cause("channel-delay", {"way": "late" if delay > 0 else "early", "delay": 1e6 * abs(delay)})
 
 
-def _of_direction(group: ChannelGroup, own: FloatArray, direction: FloatArray, left: float) -> _Cause | None:
+def _of_direction(own: FloatArray, direction: FloatArray, left: float) -> _Cause | None:
     """Read sign, factor or another direction off the vector that explains a channel."""
     along = float(direction @ own)
     across = float(np.linalg.norm(direction - along * own))
@@ -240,37 +253,6 @@ def _axis_of(direction: FloatArray) -> tuple[str, FloatArray]:
     return f"{'-' if sign < 0 else '+'}{'xyz'[place]}", sign * np.eye(3)[place]
 
 
-def _power(seen: _Seen) -> int:
-    """Return the power of i w by which a channel differs from the others; 0 where it is none."""
-    parts = np.array_split(np.arange(seen.freq_hz.size), min(_PARTS, seen.freq_hz.size))
-    expected = seen.expected
-    points = []
-    for part in parts:
-        e, s = expected[part].ravel(), seen.shown[part].ravel()
-        product = np.vdot(e, s)
-        if abs(product) > _COHERENT * max(_size(e) * _size(s), TINY):
-            points.append((math.log(float(seen.freq_hz[part].mean())), np.log(product / np.vdot(e, e).real)))
-    if len(points) < 3 or points[-1][0] - points[0][0] < math.log(_SPAN):
-        return 0
-    x, y = np.array([p[0] for p in points]), np.array([p[1] for p in points])
-    slope = float(np.polyfit(x, y.real, 1)[0])
-    power = round(slope)
-    if not 1 <= abs(power) <= 2 or abs(slope - power) > _EXPONENT:
-        return 0
-    turned = np.exp(1j * (y.imag - power * np.pi / 2)).mean()
-    return power if turned.real > _COHERENT else 0
-
-
-def _delay(seen: _Seen) -> tuple[float, float]:
-    """Return the delay in s that explains most of what a channel shows, and the share that is left."""
-    omega = 2 * np.pi * seen.freq_hz
-    product = (seen.expected.conj() * seen.shown).sum(axis=1)
-    tried = np.linspace(-1, 1, _STEPS) * _TURNS * 2 * np.pi / omega[-1]
-    best = float(tried[np.argmax((np.exp(1j * np.outer(tried, omega)) @ product).real)])
-    late = np.exp(-1j * omega * best)[:, None] * seen.expected
-    return best, seen.share_left(late)
-
-
 def _like_another(
     group: ChannelGroup, place: int, some: _Seen, motion: ComplexArray, lines: np.ndarray
 ) -> tuple[int, float]:
@@ -284,18 +266,6 @@ def _like_another(
             left[other] = some.share_left(expected)
     best = int(np.argmin(left))
     return best, float(left[best])
-
-
-def _sensor_finding(
-    group: ChannelGroup, suspects: Suspects, some: Sequence[_Seen], names: Sequence[str], error: float
-) -> Finding:
-    """Say whether a sensor with several channels is turned, or where it seems to be."""
-    numbers = _beside(group, suspects, error)
-    channels = tuple(f"{group.word} {names[i]}" for i in suspects.channels)
-    turned = _turned(some)
-    if turned is not None:
-        return Finding("channel-direction", numbers | {"shown": turned}, channels, variant="sensor")
-    return Finding("channel-place", numbers, channels, variant="sensor")
 
 
 def _turned(some: Sequence[_Seen]) -> str | None:

@@ -40,26 +40,21 @@ class ChannelGroup:
     Attributes
     ----------
     word : {"response", "force"}
-    side : {"j", "k"}
     places : ndarray of int, shape (m,)
         Rows, or columns, of the FRFs.
     nodes : tuple of int, length m
-        Of the channels.
+        Nodes of the channels.
     positions, directions : ndarray, shape (m, 3)
         m; unit vectors.
-    reference : ndarray, shape (3,)
-        Reference point of the side, m.
     h : ndarray, shape (n_freq, m, n)
         FRFs of these channels: n forces for responses, n responses for forces.
     """
 
     word: Literal["response", "force"]
-    side: str
     places: NDArray[np.intp]
     nodes: tuple[int, ...]
     positions: FloatArray
     directions: FloatArray
-    reference: FloatArray
     h: ComplexArray
 
     @property
@@ -69,17 +64,14 @@ class ChannelGroup:
 
     @cached_property
     def motion(self) -> FloatArray:
-        """What the channels show of unit motions of their middle, shape (m, 6); rotations times their reach."""
-        arms = self.positions - self.positions.mean(axis=0)
-        reach = np.sqrt((arms**2).sum(axis=1).mean()) or 1.0
-        return np.hstack([self.directions, np.cross(arms / reach, self.directions)])
+        """Response of the channels to unit motions of their middle, shape (m, 6); rotations times their reach."""
+        return np.stack([one @ self.at(place) for place, one in zip(self.positions, self.directions, strict=True)])
 
     def at(self, position: FloatArray) -> FloatArray:
         """Return the displacement of a place for the same unit motions, shape (3, 6)."""
-        arms = self.positions - self.positions.mean(axis=0)
-        reach = np.sqrt((arms**2).sum(axis=1).mean()) or 1.0
-        arm = np.broadcast_to((position - self.positions.mean(axis=0)) / reach, (3, 3))
-        return np.hstack([np.eye(3), np.cross(arm, np.eye(3))])
+        middle = self.positions.mean(axis=0)
+        reach = np.sqrt(((self.positions - middle) ** 2).sum(axis=1).mean()) or 1.0
+        return np.hstack([np.eye(3), np.cross((position - middle) / reach, np.eye(3))])
 
     def filled(self, missing: NDArray[np.bool_]) -> ChannelGroup:
         """Return the same with FRFs that are missing, shape (m, n), as the other channels expect them: neutral."""
@@ -94,14 +86,14 @@ class ChannelGroup:
 
     def only(self, kept: NDArray[np.intp]) -> ChannelGroup:
         """Return the same with some of the channels."""
-        nodes = tuple(self.nodes[i] for i in kept)
-        place, direction, h = self.positions[kept], self.directions[kept], np.ascontiguousarray(self.h[:, kept])
-        return ChannelGroup(self.word, self.side, self.places[kept], nodes, place, direction, self.reference, h)
+        nodes, h = tuple(self.nodes[i] for i in kept), np.ascontiguousarray(self.h[:, kept])
+        positions, directions = self.positions[kept], self.directions[kept]
+        return replace(self, places=self.places[kept], nodes=nodes, positions=positions, directions=directions, h=h)
 
 
 @dataclass(frozen=True, eq=False)
 class Suspects:
-    """Channels without which the others move as one body.
+    """Channels without which the remaining channels move as one body.
 
     Attributes
     ----------
@@ -110,13 +102,13 @@ class Suspects:
     channels : tuple of int
         Places in the group.
     gain : float
-        Mean logarithm, over the band, of the mean square of the residual with them over that of the others: the more,
-        the better they explain what is not rigid.
+        Mean logarithm, over the band, of the factor by which the mean square of the residual falls without them.
     ratio : float
-        Mean square of the residual that they cause over that of the others, where the others are most rigid.
+        Mean square of the residual that they cause, relative to the mean square of the remaining residual, on the most
+        rigid lines.
     rest : float
-        Root mean square of the residual of the others, relative to their motion.
-    parts : ndarray of int, shape (n_lines,)
+        Root mean square of the remaining residual, relative to the motion.
+    lines : ndarray of int, shape (n_lines,)
         Lines by which they were judged.
     """
 
@@ -171,7 +163,7 @@ class _Residuals:
         return np.asarray(self.q @ self.power @ self.q)
 
     def without(self, channels: Sequence[int]) -> FloatArray | None:
-        """Return squares of the residual of the other channels, shape (n_parts,); None where they cannot say these."""
+        """Return squares of the residual of the other channels, shape (n_parts,); None if they do not predict these."""
         own = np.ix_(channels, channels)
         q = self.q[own]
         if np.linalg.eigvalsh(q)[0] < _LEAST_REDUNDANCY:
@@ -217,7 +209,7 @@ def _projection(motion: FloatArray, root: FloatArray) -> FloatArray:
 
 
 def find_suspects(group: ChannelGroup) -> Suspects | None:
-    """Find the channels without which the others move most like one body; None where too few are left to say it."""
+    """Find the channels without which the remaining ones move most like one body; None if too few remain."""
     found = list(_suspects(group))
     if not found:
         return None
@@ -262,7 +254,7 @@ def _judged(
 def column_size(h: ComplexArray) -> FloatArray:
     """Return the median size of the channels that move, by lines and columns, shape (n_freq, n); 1 where none does.
 
-    In a plane of symmetry most channels do not but for rounding.
+    In a plane of symmetry the motion of most channels is round-off.
     """
     power = np.sort(h.real**2 + h.imag**2, axis=1)
     most = power.shape[1]

@@ -17,7 +17,7 @@ from jointfrf.channels.check.driving_points import (
     sectors,
     sign_findings,
 )
-from jointfrf.channels.check.pair_ratios import are_signals
+from jointfrf.channels.check.pair_ratios import Polar, are_signals, exponents
 from jointfrf.channels.check.signals import as_measurement, modulus, smoothness
 from jointfrf.channels.extent import extent_of, longest_extent
 from jointfrf.channels.joint_channels import JointChannels
@@ -54,13 +54,11 @@ def side_findings(
     """
     best = np.sort(np.argsort(share, kind="stable")[: max(round(_BEST * share.size), 1)])
     n = h.shape[1] // 2
-    power, log_factor, agreed = _ratio(freq_hz[best], h[best], hidden, n)
+    power, log_factor, agreed = _ratio(2 * np.pi * freq_hz[best], h[best], hidden, n)
     driving = np.einsum("faa->fa", h)
     decided = sectors(driving[best])
-    both = Sectors(
-        np.array([_most(decided.quarter[own]) for own in (slice(0, n), slice(n, None))]),
-        np.array([np.median(decided.negative[own]) for own in (slice(0, n), slice(n, None))]),
-    )
+    quarter = np.array([_most(own) for own in decided.quarter.reshape(2, n)])
+    both = Sectors(quarter, np.median(decided.negative.reshape(2, n), axis=1))
     # of displacements only: rotations per moment follow the same exponent
     omega = 2 * np.pi * freq_hz
     powers = np.array([0, -power]) - min(0, -power)
@@ -94,22 +92,18 @@ def _most(quarter: np.ndarray) -> int:
     return best if 2 * count[best] > known.size else -1
 
 
-def _ratio(freq_hz: FloatArray, h: ComplexArray, hidden: np.ndarray, n: int) -> tuple[int, complex, float]:
+def _ratio(omega: FloatArray, h: ComplexArray, hidden: np.ndarray, n: int) -> tuple[int, complex, float]:
     """Return the power of i w, the logarithm and the scatter over pairs of h_jk / h_kj: side j over side k."""
-    above, below = h[:, :n, n:], h[:, n:, :n].swapaxes(1, 2)
     size = np.median(modulus(h), axis=0)
     seen = (are_signals(size, smoothness(h), len(h)) & ~hidden & ~hidden.T)[:n, n:]
     if not seen.any():
         return 0, 0j, math.inf
-    ratio = above[:, seen] / below[:, seen]
-    middle = np.median(np.log(modulus(ratio)), axis=1)
-    x = np.log(2 * np.pi * freq_hz)
-    spread = ((x - x.mean()) ** 2).sum()
-    slope = float(((x - x.mean()) * middle).sum() / spread) if spread > 0 else 0.0
+    below = Polar.of(h[:, n:, :n].swapaxes(1, 2)[:, seen])
+    amplitude, phasor = Polar.of(h[:, :n, n:][:, seen]).over(below)
+    slope = float(exponents(omega, np.median(amplitude, axis=1)))
     power = round(slope) if abs(slope - round(slope)) < _EXPONENT and abs(round(slope)) <= 2 else 0
-    turned = ratio / modulus(ratio) * (-1j) ** power
-    sign = 0.0 if turned.sum().real >= 0 else math.pi
-    own = np.median(np.log(modulus(ratio)) - power * x[:, None], axis=0)
+    sign = 0.0 if (phasor * (-1j) ** power).sum().real >= 0 else math.pi
+    own = np.median(amplitude - power * np.log(omega)[:, None], axis=0)
     return power, complex(np.median(own), sign), float(1.4826 * np.median(abs(own - np.median(own))))
 
 

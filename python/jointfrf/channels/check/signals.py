@@ -87,6 +87,11 @@ class Measurement:
         """FRFs between the DOFs that responses and forces share, shape (n_freq, n, n)."""
         return self.h[:, self.rows[:, None], self.columns] * self.signs
 
+    @cached_property
+    def driving(self) -> ComplexArray:
+        """Driving-point FRFs, shape (n_freq, n)."""
+        return np.asarray(np.einsum("faa->fa", self.square))
+
     @property
     def square_smoothness(self) -> FloatArray:
         """Smoothness of `square`, shape (n, n)."""
@@ -137,7 +142,7 @@ def as_measurement(
     forces: Sequence[str | Channel],
     hidden: NDArray[np.bool_],
 ) -> Measurement:
-    """Pair responses with forces by name; a name like 102:-y is the opposite of 102:+y."""
+    """Pair responses with forces by name. The direction 102:-y is opposite to 102:+y."""
     of_responses = tuple(_both_ways(name)[0] for name in responses)
     of_forces, opposite = zip(*map(_both_ways, forces), strict=True) if forces else ((), ())
     place = {name: (i, 1) for i, name in enumerate(of_forces)}
@@ -199,47 +204,44 @@ def _both_ways(name: str | Channel) -> tuple[str, str]:
     return str(channel), str(channel.opposite())
 
 
-@dataclass(frozen=True)
-class BadSignals:
-    """Findings, and the responses and forces that no other check can use."""
+def check_signals(measurement: Measurement) -> tuple[list[Finding], list[int], list[int]]:
+    """Find dead and doubled channels.
 
-    findings: list[Finding]
-    rows: list[int]
-    columns: list[int]
-
-
-def check_signals(measurement: Measurement) -> BadSignals:
-    """Find responses and forces that are dead or doubled."""
+    Returns
+    -------
+    tuple of list
+        Findings, and the responses and forces that no other check can use.
+    """
     findings: list[Finding] = []
     bad: list[list[int]] = []
-    across = measurement.h.swapaxes(1, 2)
-    smooth, square = measurement.smoothness, measurement.square
+    least, square = _least_smoothness(len(measurement.h)), measurement.square
     # Reciprocal to rounding: calculated, or made so; equal channels are then no copies of noise.
     is_exact = bool(square.size and abs(square - square.swapaxes(1, 2)).max() <= _EXACT * abs(square).max())
-    paired = _reciprocal(measurement)
-    for word, names, h, own, is_reciprocal in (
-        ("response", measurement.responses, measurement.h, smooth, paired[0]),
-        ("force", measurement.forces, across, smooth.T, paired[1]),
+    across, paired = measurement.h.swapaxes(1, 2), _reciprocal(measurement)
+    for word, names, h, smooth, is_reciprocal in (
+        ("response", measurement.responses, measurement.h, measurement.smoothness, paired[0]),
+        ("force", measurement.forces, across, measurement.smoothness.T, paired[1]),
     ):
-        dead = _dead(own, len(h), is_reciprocal)
-        findings += [_dead_finding(word, names[i], float(own[i].max()), len(h)) for i in dead]
+        best = smooth.max(axis=1)
+        # FRFs on few, coarse lines are not smooth, but no noise.
+        like_noise = (len(h) * (smooth**2).mean(axis=1) < _OF_NOISE) & ~is_reciprocal
+        dead = np.flatnonzero((best < LEAST_SMOOTHNESS) | ((best < least) & like_noise)).tolist()
+        for i in dead:
+            numbers = {"agreement": float(best[i]), "least": least}
+            findings.append(
+                Finding("dead-channel", numbers, (f"{word} {names[i]}",), variant="" if best[i] else "zero")
+            )
         copies = [] if is_exact else _copies(h, dead)
-        findings += [_copy_finding(word, names[i], names[j], value) for i, j, value in copies]
+        for i, j, value in copies:
+            about = (f"{word} {names[i]}", f"{word} {names[j]}")
+            findings.append(Finding("doubled-channel", {"difference": value}, about))
         bad.append([*dead, *(place for i, j, _ in copies for place in (i, j))])
-    return BadSignals(findings, *bad)
+    return findings, bad[0], bad[1]
 
 
 def _least_smoothness(n_freq: int) -> float:
     """Return the agreement of the phase that noise on so many lines does not reach."""
     return float(max(LEAST_SMOOTHNESS, _SMOOTHEST / np.sqrt(n_freq)))
-
-
-def _dead(smooth: FloatArray, n_freq: int, is_reciprocal: NDArray[np.bool_]) -> list[int]:
-    """Return the rows that are zero or noise in all columns; FRFs on few, coarse lines are not smooth, but no noise."""
-    best = smooth.max(axis=1)
-    like_noise = (n_freq * (smooth**2).mean(axis=1) < _OF_NOISE) & ~is_reciprocal
-    dead = (best < LEAST_SMOOTHNESS) | ((best < _least_smoothness(n_freq)) & like_noise)
-    return [int(i) for i in np.flatnonzero(dead)]
 
 
 def _reciprocal(m: Measurement) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -254,11 +256,6 @@ def _reciprocal(m: Measurement) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     found = agreement.max(axis=0, initial=0.0) > _RECIPROCAL
     rows[m.rows], columns[m.columns] = found, found
     return rows, columns
-
-
-def _dead_finding(word: str, name: str, value: float, n_freq: int) -> Finding:
-    numbers = {"agreement": value, "least": _least_smoothness(n_freq)}
-    return Finding("dead-channel", numbers, (f"{word} {name}",), variant="zero" if value == 0 else "")
 
 
 def _copies(h: ComplexArray, dead: list[int]) -> list[tuple[int, int, float]]:
@@ -282,10 +279,6 @@ def _copies(h: ComplexArray, dead: list[int]) -> list[tuple[int, int, float]]:
     return found
 
 
-def _copy_finding(word: str, first: str, second: str, value: float) -> Finding:
-    return Finding("doubled-channel", {"difference": value}, (f"{word} {first}", f"{word} {second}"))
-
-
 def find_bad_lines(
     freq_hz: FloatArray, h: ComplexArray, responses: tuple[str, ...], forces: tuple[str, ...]
 ) -> tuple[list[Finding], NDArray[np.bool_]]:
@@ -294,7 +287,16 @@ def find_bad_lines(
     finite = np.isfinite(h)
     good = np.asarray(finite.all(axis=(1, 2)))
     if not good.all():
-        findings.append(_not_finite(freq_hz, finite, good, responses, forces))
+        rows, columns = (
+            tuple(f"{word} {names[i]}" for i in np.flatnonzero(~finite.all(axis=axes)))
+            for word, names, axes in (("response", responses, (0, 2)), ("force", forces, (0, 1)))
+        )
+        some = rows if len(rows) < len(responses) and len(rows) <= len(columns) else columns
+        is_some = len(some) < len(responses if some is rows else forces)
+        first = int(np.argmin(good))
+        numbers = {"count": int((~good).sum()), "total": good.size, "line": first, "freq": float(freq_hz[first])}
+        about, variant = (some, "channels") if is_some else ((), "")
+        findings.append(Finding("not-finite", numbers, about, variant=variant))
     zero = freq_hz == 0
     if zero.any():
         findings.append(Finding("zero-frequency", {"line": int(np.argmax(zero))}))
@@ -305,23 +307,3 @@ def find_bad_lines(
         numbers = {"line": first, "before": float(freq_hz[first - 1]), "after": float(freq_hz[first])}
         findings.append(Finding("frequency-order", numbers))
     return findings, good & ~zero & ascending
-
-
-def _not_finite(
-    freq_hz: FloatArray,
-    finite: NDArray[np.bool_],
-    good: NDArray[np.bool_],
-    responses: tuple[str, ...],
-    forces: tuple[str, ...],
-) -> Finding:
-    """Name the channels that hold NaN, or the lines where all do."""
-    bad = ~finite
-    rows, columns = np.asarray(bad.any(axis=(0, 2))), np.asarray(bad.any(axis=(0, 1)))
-    some: tuple[str, ...] = ()
-    if not rows.all() and rows.sum() <= columns.sum():
-        some = tuple(f"response {name}" for name, is_bad in zip(responses, rows, strict=True) if is_bad)
-    elif not columns.all():
-        some = tuple(f"force {name}" for name, is_bad in zip(forces, columns, strict=True) if is_bad)
-    first = int(np.argmin(good))
-    numbers = {"count": int((~good).sum()), "total": good.size, "line": first, "freq": float(freq_hz[first])}
-    return Finding("not-finite", numbers, some, variant="channels" if some else "")
