@@ -70,12 +70,13 @@ def _run(words: list[str], stop_if_interrupted: Callable[[], None]) -> int:
         hint = did_you_mean(name, COMMANDS) or "; see jointfrf --help"
         raise UsageError(f"unknown command {name!r}{hint}")
     parser = command_parser(name)
-    args = parser.parse_words(words[1:])
-    args.typed = shlex.join(["jointfrf", *words])
-    args.warned = []
-    args.stop_if_interrupted = stop_if_interrupted
-    with shown_warnings(args.warned), _limited(args.limit_gb):
-        parser.check_required(with_configuration(args, parser, name))
+    found = parser.parse_words(words[1:])
+    typed, warned = shlex.join(["jointfrf", *words]), list[str]()
+    with shown_warnings(warned), _limited(found.limit_gb):
+        args = parser.arguments_of(
+            with_configuration(found, parser, name), typed=typed, warned=warned, stop_if_interrupted=stop_if_interrupted
+        )
+        args.check_files()
         command = import_module(f"jointfrf.workbench.cli.{name}")
         stop_if_interrupted()
         with nullcontext() if args.quiet else shown_progress(name):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import re
@@ -14,10 +13,13 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from jointfrf.extras import MissingPackageError
+from jointfrf.extras import MissingPackageError, check_extras
 from jointfrf.spelling import cut, message, visible
+
+if TYPE_CHECKING:
+    from jointfrf.workbench.cli.arguments.declaration import Arguments
 
 __all__ = [
     "EXPECTED",
@@ -26,12 +28,17 @@ __all__ = [
     "OptionWarning",
     "Output",
     "UsageError",
+    "check_both",
+    "check_figures",
     "check_folder",
+    "check_frf_file",
     "check_out",
+    "check_page",
+    "check_page_and_folder",
+    "check_page_with_figures",
     "complain",
     "listed",
     "plain",
-    "positive",
     "sentence",
     "shown_progress",
     "shown_warnings",
@@ -68,7 +75,6 @@ _WORDS = tuple(
         (r"\bmapping (\w+=)", r"--map \1"),
         (r"\b(by|of|in) mapping\b", r"\1 --map"),
         (r"\bgive axes=", "give --map axes="),
-        (r"\bmapping (\w+)=", r"--map \1="),
         (r"\bgive unit=(?=')", "give --unit "),
         (r"\bgive unit=", "give --unit"),
         (r"\bwrite (.+) or give unit=", r"write \1 or give --unit"),
@@ -128,7 +134,7 @@ def listed(names: Sequence[str]) -> str:
     return ", ".join([*names[:-2], " and ".join(names[-2:])])
 
 
-def warn_of_ignored(args: argparse.Namespace, names: Iterable[str], why: str) -> None:
+def warn_of_ignored(args: Arguments, names: Iterable[str], why: str) -> None:
     """Warn of options that were given and have no effect."""
     found = [name for name in names if name.removeprefix("--").replace("-", "_") in args.given]
     if found:
@@ -136,13 +142,24 @@ def warn_of_ignored(args: argparse.Namespace, names: Iterable[str], why: str) ->
         warnings.warn(f"{listed(found)} {verb} no effect: {why}", OptionWarning, stacklevel=2)
 
 
-class Output:
-    """Where the text and the numbers of a command go, by its options `--json` and `--quiet`."""
+def check_both(args: Arguments, one: str, other: str, example: str = "") -> None:
+    """Raise an error if only one of two options is given."""
+    if (getattr(args, one) is None) != (getattr(args, other) is None):
+        raise UsageError(f"only one of --{one} and --{other} is given; give both{example}")
 
-    def __init__(self, args: argparse.Namespace) -> None:
-        self._is_json: bool = args.json
-        self._is_quiet: bool = args.quiet
-        self._warned: list[str] = args.warned
+
+class Output:
+    """Where the text and the numbers of a command go, by its options `--json` and `--quiet`.
+
+    Attributes
+    ----------
+    written : list of Path
+        Files that the command wrote.
+    """
+
+    def __init__(self, args: Arguments) -> None:
+        self._is_json, self._is_quiet, self._warned = args.json, args.quiet, args.warned
+        self.written: list[Path] = []
 
     def say(self, *lines: object) -> None:
         """Print lines of text, unless JSON or nothing is wanted."""
@@ -157,10 +174,11 @@ class Output:
             complain("warning", text)
 
     def give(self, content: Mapping[str, Any]) -> None:
-        """Print the result as JSON where that is wanted, with all warnings at its top level."""
+        """Print the files written and, where that is wanted, the result as JSON with all warnings at its top level."""
+        self.say(*([""] if self.written else []), *(f"wrote {path}" for path in self.written))
         if self._is_json:
             warned = [_in_options(cut(str(text))) for text in (*content.get("warnings", ()), *self._warned)]
-            whole = {**content, "warnings": list(dict.fromkeys(warned))}
+            whole = {**content, "written": self.written, "warnings": list(dict.fromkeys(warned))}
             _LINE.clear()
             print(json.dumps(plain(whole), indent=2, allow_nan=False))
 
@@ -208,11 +226,51 @@ def check_out(option: str, path: Path | None) -> None:
         raise UsageError(f"{option}: {there} is a file; name a folder")
 
 
-def positive(word: str, least: int = 1) -> int:
-    """Return a whole number of at least 1, or another least one."""
-    if not word.isdecimal() or int(word) < least:
-        raise argparse.ArgumentTypeError(f"{word!r} is no whole number of at least {least}; give one")
-    return int(word)
+def check_page(option: str, path: Path) -> None:
+    """Check that a page can be written there."""
+    check_folder(option, path)
+    check_extras("jinja2")
+
+
+def check_page_with_figures(option: str, path: Path) -> None:
+    """Check that a page with figures can be written there."""
+    check_page(option, path)
+    check_extras("matplotlib")
+
+
+def check_page_and_folder(option: str, path: Path) -> None:
+    """Check that a page can be written there, whose folder need not exist."""
+    check_extras("jinja2")
+    check_out(option, path.parent)
+    if path.is_dir():
+        raise UsageError(f"{option}: {path} is a folder; name a file")
+
+
+def check_figures(option: str, path: Path) -> None:
+    """Check that figures can be written into a folder."""
+    check_extras("matplotlib")
+    check_out(option, path)
+
+
+def check_frf_file(option: str, path: Path) -> None:
+    """Check that FRFs can be written to a path.
+
+    Raises
+    ------
+    UsageError
+        No format has its suffix, there is no such folder, or it is one.
+    MissingPackageError
+        A package for the format is not installed.
+    """
+    from jointfrf.io.formats import check_suffix
+
+    try:
+        needed = check_suffix(path).package
+    except ValueError as error:
+        raise UsageError(error) from error
+    check_folder(option, path)
+    if needed:
+        check_extras(needed)
 
 
 class _Stage:
@@ -346,7 +404,7 @@ class Failures:
         Sentences by the names of the tests.
     """
 
-    def __init__(self, args: argparse.Namespace) -> None:
+    def __init__(self, args: Arguments) -> None:
         self._stop_if_interrupted: Callable[[], None] = args.stop_if_interrupted
         self._is_first = True
         self.found: dict[str, str] = {}
