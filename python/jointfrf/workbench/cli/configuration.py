@@ -136,5 +136,5 @@ def _text(value: Any, between: str) -> str:
 
 
 def _one(option: DeclaredArgument, text: str, folder: Path) -> Any:
-    found = option.parse(text)
+    found = option.form.parse(text)
     return folder / found if isinstance(found, Path) else found

@@ -78,9 +78,7 @@ def levels_of_decays(
     file, _ = file.located(parts)
     names = _channels(args, file, modes[0].sensors)
     whole = file.assembly(lines, parts, [dof.removeprefix("-") for dof in names.values()])
-    errors = tuple(args.errors) if "errors" in args.given else _ERRORS
-    if len(errors) != 2:
-        raise UsageError(f"--errors has {len(errors)} numbers; give two, of frequency and of damping")
+    errors = (args.errors[0], args.errors[1]) if "errors" in args.given else _ERRORS
     found = decay_levels(whole, modes, channels=names, dof=args.dof, errors=errors, laws=args.laws)
     return found, {"sources": [str(args.decay)]} | modes_content(modes)
 

@@ -107,18 +107,16 @@ def _by_hand(found: JointFile, request: CardRequest, freq_hz: float | None) -> s
 
 
 def _at_point(found: JointFile, point: str | None) -> JointFile:
-    """Return the one of several joint points that is named; the joint itself where it has no points."""
-    known = () if found.fit is None else found.fit.points
-    if point is None and not known:
+    """Return the named one of several joint points, or the joint itself if it has no points."""
+    if found.fit is None or not found.fit.points:
+        if point is not None:
+            raise UsageError("the file has no joint points; leave out --point")
         return found
-    if found.fit is None or point not in known:
-        raise UsageError(
-            f"--point is {point!r}; use one of {', '.join(known)}"
-            if known and point is not None
-            else "the file has no joint points; leave out --point"
-            if point is not None
-            else f"the file has joint points {', '.join(known)}; name one by --point, or all by PROGRAM:NAME=J,K:..."
-        )
+    known = ", ".join(found.fit.points)
+    if point is None:
+        raise UsageError(f"the file has joint points {known}, so name one by --point, or all by PROGRAM:NAME=J,K")
+    if point not in found.fit.points:
+        raise UsageError(f"--point is {point!r}; use one of {known}")
     fit = found.fit.at_point(point)
     return found._replace(fit=fit, joint=fit.joint, about=(*found.about, f"joint point {point}"))
 
@@ -209,9 +207,8 @@ def card_request(
     """
     needing = ("--output", "--nodes-at", "--units", "--faces")
     if args.export is None:
-        for name in needing:
-            if name.removeprefix("--").replace("-", "_") in args.given:
-                raise UsageError(f"{name} is for cards; add --export PROGRAM:J,K")
+        for name in args.gave(needing):
+            raise UsageError(f"{name} is for cards; add --export PROGRAM:J,K")
         others = [name for name in CardArguments.names() if name not in needing]
         warn_of_ignored(args, others, "no cards are written without --export PROGRAM:J,K")
         return None

@@ -164,8 +164,6 @@ def _backbone(args: LevelsArguments, path: Path, channel: str) -> Backbone:
         raise FileContentError(f"{path}: column damping is missing; add it{hint}")
     if len(given) > 1:
         raise FileContentError(f"{path}: has damping and force; leave out damping for tests at phase resonance")
-    if len(args.errors) != 2:
-        raise UsageError(f"--errors has {len(args.errors)} numbers; give two, of frequency and of damping")
     freq, amplitude, other = (np.array([row[name] for row in rows]) for name in ("frequency", "amplitude", *given))
     with np.errstate(all="ignore"):  # a frequency of zero is an error below
         amplitude = amplitude / (2 * np.pi * freq) ** get_args(MotionQuantity).index(args.motion)

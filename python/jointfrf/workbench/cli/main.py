@@ -31,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        Words after `jointfrf`; those of the process by default.
+        Words after `jointfrf`; the words of the process by default.
 
     Returns
     -------

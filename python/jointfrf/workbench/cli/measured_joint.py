@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 
 from jointfrf.channels.check.result import FrfCheck
 from jointfrf.channels.joint_channels import (
+    ChannelAgreement,
     JointChannels,
     LeftOutDof,
     OffsetCoupling,
@@ -89,13 +91,6 @@ class MeasuredJoint:
             found.append(named)
         return found
 
-    @property
-    def transform(self) -> Interface | tuple[Interface, Interface] | None:
-        """What `identify` takes."""
-        if self.is_of_points:
-            return None
-        return self.responses if self.responses is self.forces else (self.responses, self.forces)
-
     def known(self, frfs: FrfSet, *, is_noise_stated: bool) -> dict[str, Any]:
         """Return what `identify` takes of the channels: to the joint DOFs, set-ups, coherence where the file has it.
 
@@ -104,7 +99,9 @@ class MeasuredJoint:
         names = self.responses.channels, self.forces.channels
         coherence = None if is_noise_stated else frfs.coherence_matrix(*names)
         shared = {} if coherence is None else {"coherence": coherence, "averages": frfs.least_averages(*names)}
-        return {"transform": self.transform, "setups": frfs.setups_between(*names), **shared}
+        one_or_both = self.responses if self.is_square else (self.responses, self.forces)
+        transform = None if self.is_of_points else one_or_both
+        return {"transform": transform, "setups": frfs.setups_between(*names), **shared}
 
     @property
     def dofs(self) -> tuple[str, ...]:
@@ -215,6 +212,13 @@ def _not_rigid(group: SideAgreement) -> float:
     return float(np.sqrt(max(1 - group.rigid**2, 0)))
 
 
+def _agreement_cell(one: ChannelAgreement | None) -> str:
+    if one is None:
+        return " " * 32
+    blame = "  ?" if np.isnan(one.blame) else f"{100 * one.blame:.0f} %"
+    return f"{one.channel!s:<12}{one.consistency:>12.3f}{blame:>8}"
+
+
 def _agreement_table(groups: tuple[SideAgreement, ...]) -> Iterator[str]:
     """Write the channels of each side beside one another: consistency and blame."""
     for kind in ("response", "excitation"):
@@ -226,17 +230,8 @@ def _agreement_table(groups: tuple[SideAgreement, ...]) -> Iterator[str]:
             )
         heading = f"  {'channel':<12}{'consistency':>12}{'blame':>8}"
         yield f"{heading}    {heading.strip()}"
-        rows = max(len(j.channels), len(k.channels))
-        for i in range(rows):
-            cells = []
-            for group in (j, k):
-                if i >= len(group.channels):
-                    cells.append(" " * 32)
-                    continue
-                one = group.channels[i]
-                blame = "  ?" if np.isnan(one.blame) else f"{100 * one.blame:.0f} %"
-                cells.append(f"{one.channel!s:<12}{one.consistency:>12.3f}{blame:>8}")
-            yield ("  " + "    ".join(cells)).rstrip()
+        for pair in zip_longest(j.channels, k.channels):
+            yield f"  {'    '.join(map(_agreement_cell, pair))}".rstrip()
         yield ""
     yield "consistency: 1 where a channel moves as the others say"
     yield "blame: share of what is not rigid on its side that is gone without it"

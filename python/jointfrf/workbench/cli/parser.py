@@ -43,7 +43,7 @@ _NEGATIVE = re.compile(r"-\.?\d")
 
 
 class CommandParser(argparse.ArgumentParser):
-    """A parser whose errors suggest what was meant; options are written in full.
+    """A parser whose errors suggest a known word; options are written in full.
 
     Attributes
     ----------
@@ -179,7 +179,7 @@ def _for_argparse(one: DeclaredArgument) -> dict[str, Any]:
     text = (one.help + _default(one.otherwise or one.default)).replace("%", "%%")
     if one.is_flag:
         return {"action": "store_true", "help": text}
-    about = {"help": text, "type": one.parse, "default": one.default, "choices": one.choices}
+    about = {"help": text, "type": one.form.parse, "default": one.default, "choices": one.form.choices}
     if one.metavar:
         about["metavar"] = one.metavar
     if one.is_positional and (one.is_list or one.is_optional):

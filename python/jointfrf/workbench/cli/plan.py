@@ -80,7 +80,7 @@ def run(args: PlanArguments) -> int:
 
 def _of_case(args: PlanArguments, freq: FloatArray, out: Output) -> int:
     """Print how well FRFs between all joint DOFs of a case determine the joint."""
-    of_parts = [name for name in PartsArguments.names() if name.removeprefix("--").replace("-", "_") in args.given]
+    of_parts = args.gave(PartsArguments.names())
     if of_parts:
         raise UsageError(f"a case has all FRFs between its joint DOFs; leave out {listed(of_parts)}")
     case, _ = read_case_and_kind(args.model if args.model.is_dir() else args.model.parent)

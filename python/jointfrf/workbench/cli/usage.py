@@ -29,13 +29,10 @@ __all__ = [
     "Output",
     "UsageError",
     "check_both",
-    "check_figures",
+    "check_file_in_folder",
     "check_folder",
     "check_frf_file",
     "check_out",
-    "check_page",
-    "check_page_and_folder",
-    "check_page_with_figures",
     "complain",
     "listed",
     "plain",
@@ -136,7 +133,7 @@ def listed(names: Sequence[str]) -> str:
 
 def warn_of_ignored(args: Arguments, names: Iterable[str], why: str) -> None:
     """Warn of options that were given and have no effect."""
-    found = [name for name in names if name.removeprefix("--").replace("-", "_") in args.given]
+    found = args.gave(names)
     if found:
         verb = "have" if found[1:] else "has"
         warnings.warn(f"{listed(found)} {verb} no effect: {why}", OptionWarning, stacklevel=2)
@@ -149,7 +146,7 @@ def check_both(args: Arguments, one: str, other: str, example: str = "") -> None
 
 
 class Output:
-    """Where the text and the numbers of a command go, by its options `--json` and `--quiet`.
+    """The text and the numbers of a command, printed as its options `--json` and `--quiet` state.
 
     Attributes
     ----------
@@ -184,7 +181,7 @@ class Output:
 
 
 def plain(value: Any) -> Any:
-    """Return a value as JSON holds it: what is not finite becomes null, a complex number a pair."""
+    """Return a value as JSON contains it: a number that is not finite becomes null, a complex number a pair."""
     if isinstance(value, Mapping):
         return {str(key): plain(each) for key, each in value.items()}
     if hasattr(value, "tolist"):  # arrays and numbers of numpy
@@ -226,30 +223,11 @@ def check_out(option: str, path: Path | None) -> None:
         raise UsageError(f"{option}: {there} is a file; name a folder")
 
 
-def check_page(option: str, path: Path) -> None:
-    """Check that a page can be written there."""
-    check_folder(option, path)
-    check_extras("jinja2")
-
-
-def check_page_with_figures(option: str, path: Path) -> None:
-    """Check that a page with figures can be written there."""
-    check_page(option, path)
-    check_extras("matplotlib")
-
-
-def check_page_and_folder(option: str, path: Path) -> None:
-    """Check that a page can be written there, whose folder need not exist."""
-    check_extras("jinja2")
+def check_file_in_folder(option: str, path: Path) -> None:
+    """Check that a file can be written there, whose folder need not exist."""
     check_out(option, path.parent)
     if path.is_dir():
         raise UsageError(f"{option}: {path} is a folder; name a file")
-
-
-def check_figures(option: str, path: Path) -> None:
-    """Check that figures can be written into a folder."""
-    check_extras("matplotlib")
-    check_out(option, path)
 
 
 def check_frf_file(option: str, path: Path) -> None:

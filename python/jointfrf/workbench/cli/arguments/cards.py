@@ -5,7 +5,7 @@ from typing import Annotated, cast, get_args
 
 from jointfrf.choices import CardFormat, UnitSystemName
 from jointfrf.spelling import did_you_mean
-from jointfrf.workbench.cli.arguments.declaration import Arguments, Form, option
+from jointfrf.workbench.cli.arguments.declaration import Arguments, Form, flag, option
 from jointfrf.workbench.cli.arguments.words import Count, NewFile, nodes, numbers, words
 
 __all__ = ["CardArguments", "CardNodes", "CardProgram", "TermArguments"]
@@ -66,8 +66,8 @@ CardProgram = Annotated[tuple[CardFormat, CardNodes], Form("PROGRAM:J,K", _progr
 class TermArguments(Arguments):
     """Terms of the joint that the cards contain; keywords of `jointfrf.identification.fit_cards.cards`."""
 
-    all_damping: bool = option("include dashpots that are negative or not significantly above zero", default=False)
-    bounds: bool = option("include stiffnesses with an unbounded interval, by their best estimates", default=False)
+    all_damping: bool = flag("include dashpots that are negative or not significantly above zero")
+    bounds: bool = flag("include stiffnesses with an unbounded interval, by their best estimates")
 
 
 class CardOptionArguments(Arguments):
@@ -83,10 +83,8 @@ class CardOptionArguments(Arguments):
     damping_nodes: Count | None = option(
         "first number of auxiliary nodes for dashpots (calculix)", otherwise="stiffness only in calculix"
     )
-    full_matrix: bool = option("write matrices even if springs suffice (abaqus, nastran, lsdyna)", default=False)
-    connector: bool = option(
-        "write a connector element, for direct steady-state steps, instead of matrices (abaqus)", default=False
-    )
+    full_matrix: bool = flag("write matrices even if springs suffice (abaqus, nastran, lsdyna)")
+    connector: bool = flag("write a connector element, for direct steady-state steps, instead of matrices (abaqus)")
 
 
 class CardArguments(CardOptionArguments, TermArguments):
@@ -100,4 +98,4 @@ class CardArguments(CardOptionArguments, TermArguments):
         "point of the joint",
         otherwise="the reference point",
     )
-    no_damping: bool = option("leave out all damping", default=False)
+    no_damping: bool = flag("leave out all damping")

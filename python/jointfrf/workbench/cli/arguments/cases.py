@@ -1,6 +1,6 @@
 """Arguments of `jointfrf cases`."""
 
-from jointfrf.workbench.cli.arguments.declaration import Arguments, option
+from jointfrf.workbench.cli.arguments.declaration import Arguments, flag
 
 __all__ = ["CasesArguments"]
 
@@ -11,4 +11,4 @@ class CasesArguments(Arguments):
     description = "List the cases that come with jointfrf."
     examples = ("jointfrf cases",)
 
-    keys: bool = option("print all keys of case.toml and expected.toml (Markdown) instead", default=False)
+    keys: bool = flag("print all keys of case.toml and expected.toml (Markdown) instead")

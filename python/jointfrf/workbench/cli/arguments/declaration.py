@@ -3,15 +3,16 @@
 import argparse
 import inspect
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import MISSING, Field, dataclass, field, fields
 from pathlib import Path
 from types import NoneType
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, dataclass_transform, get_args, get_origin
 
+from jointfrf.extras import check_extras
 from jointfrf.spelling import did_you_mean
 
-__all__ = ["Arguments", "DeclaredArgument", "Form", "declared", "number", "one_of", "option", "positional"]
+__all__ = ["Arguments", "DeclaredArgument", "Form", "declared", "flag", "number", "one_of", "option", "positional"]
 
 
 class Form(NamedTuple):
@@ -27,12 +28,15 @@ class Form(NamedTuple):
         Checks a file to be written before the command starts; takes the name of the option and the value.
     choices : tuple of str or None
         The words there are.
+    packages : tuple of str
+        Packages that write the file.
     """
 
     metavar: str
     parse: Callable[[str], Any]
     check: Callable[[str, Any], None] | None = None
     choices: tuple[str, ...] | None = None
+    packages: tuple[str, ...] = ()
 
 
 def one_of(known: Collection[str]) -> Callable[[str], str]:
@@ -87,6 +91,11 @@ def option(text: str, metavar: str = "", default: Any = None, *, otherwise: str 
     return field(default=default, metadata=about)
 
 
+def flag(text: str) -> Any:
+    """Declare a field as an option without a value."""
+    return option(text, default=False)
+
+
 def positional(text: str, metavar: str, *, optional: bool = False) -> Any:
     """Declare a field as a positional argument: a list takes several words."""
     about = {"help": text, "metavar": metavar, "is_positional": True}
@@ -96,7 +105,7 @@ def positional(text: str, metavar: str, *, optional: bool = False) -> Any:
 _GIGABYTES = Form("GB", number(lambda found: found > 0, "is not a number above 0; use a size in GB"))
 
 
-@dataclass_transform(kw_only_default=True, field_specifiers=(option, positional, field))
+@dataclass_transform(kw_only_default=True, field_specifiers=(option, flag, positional, field))
 class Arguments:
     """The arguments of a command; groups of them are bases, whose options follow in the help.
 
@@ -136,14 +145,14 @@ class Arguments:
     warned: list[str] = field(default_factory=list)
     stop_if_interrupted: Callable[[], None] = lambda: None
 
-    json: bool = option("print the result as JSON", default=False)
-    quiet: bool = option("print only warnings and errors, no progress", default=False)
+    json: bool = flag("print the result as JSON")
+    quiet: bool = flag("print only warnings and errors, no progress")
     config: str | None = option(
         "channels and default options of a project",
         "FILE",
         otherwise="jointfrf.toml in the working directory, if it exists",
     )
-    no_config: bool = option("ignore jointfrf.toml", default=False)
+    no_config: bool = flag("ignore jointfrf.toml")
     limit_gb: Annotated[float, _GIGABYTES] | None = option(
         "largest size of one file, and largest memory to read it",
         otherwise="16 GB; the larger of 1 GB and 10 times the file",
@@ -161,6 +170,10 @@ class Arguments:
         own = [one for one in declared(group) if one.group is not Arguments]
         return [one.flag for one in own if getattr(self, one.name) != one.default]
 
+    def gave(self, names: Iterable[str]) -> list[str]:
+        """Return the options among these names that were given."""
+        return [name for name in names if name.removeprefix("--").replace("-", "_") in self.given]
+
     @classmethod
     def names(cls) -> list[str]:
         """Return the names of the options, without the common options."""
@@ -175,15 +188,16 @@ class Arguments:
         """
         for one in declared(type(self)):
             value = getattr(self, one.name)
-            if one.check is not None and value is not None:
-                one.check(one.flag, value)
+            if value is not None and one.form.check is not None:
+                one.form.check(one.flag, value)
+                check_extras(*one.form.packages)
 
 
 dataclass(kw_only=True, eq=False, repr=False)(Arguments)
 
 
 class DeclaredArgument(NamedTuple):
-    """An option or positional argument as it was declared, with the parser, choices and check of its kind."""
+    """An option or positional argument as it was declared, with the form of its word."""
 
     name: str
     help: str
@@ -195,9 +209,7 @@ class DeclaredArgument(NamedTuple):
     is_optional: bool
     is_list: bool
     is_flag: bool
-    choices: tuple[str, ...] | None
-    parse: Callable[[str], Any]
-    check: Callable[[str, Any], None] | None
+    form: Form
     group: type[Arguments]
     heading: str
 
@@ -237,7 +249,7 @@ def _declared(one: Any, hint: Any, group: type[Arguments], heading: str) -> Decl
     about["keyword"] = about["keyword"] or one.name
     return DeclaredArgument(
         name=one.name, default=default, is_optional=not required, is_list=is_list, is_flag=inner is bool,
-        choices=form.choices, parse=form.parse, check=form.check, group=group, heading=heading, **about,
+        form=form, group=group, heading=heading, **about,
     )  # fmt: skip
 
 

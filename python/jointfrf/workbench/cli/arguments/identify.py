@@ -9,10 +9,10 @@ from jointfrf.laws.words import LAW_WORDS
 from jointfrf.messages.of_data import FATAL_CODES
 from jointfrf.spelling import did_you_mean
 from jointfrf.workbench.cli.arguments.cards import CardArguments, CardProgram
-from jointfrf.workbench.cli.arguments.declaration import Arguments, Form, one_of, option
+from jointfrf.workbench.cli.arguments.declaration import Arguments, Form, flag, one_of, option
 from jointfrf.workbench.cli.arguments.measured_file import FileArguments, MassArguments, NoiseArguments
 from jointfrf.workbench.cli.arguments.words import NewFile, Words, words
-from jointfrf.workbench.cli.usage import check_figures, check_page_and_folder
+from jointfrf.workbench.cli.usage import check_file_in_folder, check_out
 
 __all__ = ["FitArguments", "GainArguments", "IdentifyArguments", "SideArguments"]
 
@@ -49,14 +49,12 @@ class ModelArguments(Arguments):
         "assembly.toml: both parts as models or FRFs, the joint, other unknowns, the DOF of each channel; any FRFs of "
         "the assembly suffice then"
     )
-    each: bool = option(
+    each: bool = flag(
         "with --model: fit every file as a test of its own (levels, assemblies) and print one table; the name of each "
-        "file is added to the files of --save, --report, --output and to the folder of --out",
-        default=False,
+        "file is added to the files of --save, --report, --output and to the folder of --out"
     )
-    find_wrong_channels: bool = option(
-        "with --model: search for a channel of opposite sign or two exchanged channels that the models contradict",
-        default=False,
+    find_wrong_channels: bool = flag(
+        "with --model: search for a channel of opposite sign or two exchanged channels that the models contradict"
     )
 
 
@@ -135,17 +133,19 @@ class FitArguments(NoiseArguments, GainArguments):
     )
 
 
+_FigureFolder = Annotated[Path, Form("DIR", Path, check_out, packages=("matplotlib",))]
+_Page = Annotated[Path, Form("FILE", Path, check_file_in_folder, packages=("jinja2",))]
+
+
 class ResultArguments(Arguments):
     """Files of results."""
 
     heading = "results"
 
-    out: Annotated[Path, Form("DIR", Path, check_figures)] | None = option("folder for identification.json and figures")
-    report: Annotated[Path, Form("FILE", Path, check_page_and_folder)] | None = option(
-        "HTML page of the identification by method compliance"
-    )
+    out: _FigureFolder | None = option("folder for identification.json and figures")
+    report: _Page | None = option("HTML page of the identification by method compliance")
     save: NewFile | None = option("JSON file for the joint found by the first method")
-    save_lines: bool = option("add K* of each line to --save; the file becomes many times as long", default=False)
+    save_lines: bool = flag("add K* of each line to --save; the file becomes many times as long")
     export: CardProgram | None = option(
         "write the joint found by the first method as input of abaqus, calculix, nastran, ansys, code_aster, lsdyna or "
         "subdyn, between its nodes J and K: abaqus:9001,9002; rotations of calculix need two ROT NODEs after them; "

@@ -7,8 +7,8 @@ from typing import Annotated
 from jointfrf.choices import AMPLITUDE_LAWS, MotionQuantity
 from jointfrf.workbench.cli.arguments.declaration import Arguments, Form, one_of, option, positional
 from jointfrf.workbench.cli.arguments.measured_file import JointArguments, NoiseArguments
-from jointfrf.workbench.cli.arguments.words import NewFile, NewFolder, NumberList, words
-from jointfrf.workbench.cli.usage import check_page_with_figures
+from jointfrf.workbench.cli.arguments.words import NewFile, NewFolder, NumberList, numbers, words
+from jointfrf.workbench.cli.usage import check_folder
 
 __all__ = ["BackboneArguments", "DriveArguments", "FilterArguments", "LevelsArguments"]
 
@@ -23,8 +23,15 @@ def _sensors(word: str) -> dict[str, str]:
     return found
 
 
+def _errors(word: str) -> tuple[float, ...]:
+    return numbers(word, 2, ("pair of errors, of frequency and of damping", "0.001,0.05"))
+
+
 def _laws(word: str) -> list[str]:
     return [one_of(AMPLITUDE_LAWS)(one) for one in words(word)]
+
+
+_Page = Annotated[Path, Form("FILE", Path, check_folder, packages=("jinja2", "matplotlib"))]
 
 
 class DriveArguments(Arguments):
@@ -55,8 +62,8 @@ class BackboneArguments(Arguments):
     )
     channel: str | None = option("DOF of the measured amplitude and of the force, as the models name it: A/1:y", "DOF")
     dof: str | None = option("joint DOF to be found, if several have a law", "DOF")
-    errors: NumberList = option(
-        "relative standard errors of frequency and of damping or force", "FREQUENCY,DAMPING", [0.001, 0.05]
+    errors: Annotated[tuple[float, ...], Form("FREQUENCY,DAMPING", _errors)] = option(
+        "relative standard errors of frequency and of damping or force", default=(0.001, 0.05)
     )
 
 
@@ -109,9 +116,7 @@ class LevelResultArguments(Arguments):
 
     heading = "results"
 
-    report: Annotated[Path, Form("FILE", Path, check_page_with_figures)] | None = option(
-        "HTML page with figures of stiffness and loss factor over amplitude"
-    )
+    report: _Page | None = option("HTML page with figures of stiffness and loss factor over amplitude")
     output: NewFile | None = option("CSV table of the result")
     joints: NewFolder | None = option(
         "folder for the joint of each level, springs of its secant stiffness and damping, as LABEL.toml for export and "

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from jointfrf.choices import MAPPING_FIELDS, POWER_OF_I_OMEGA, format_names
 from jointfrf.spelling import did_you_mean
-from jointfrf.workbench.cli.arguments.declaration import Arguments, Form, option, positional
+from jointfrf.workbench.cli.arguments.declaration import Arguments, Form, flag, option, positional
 from jointfrf.workbench.cli.arguments.words import Band, Dofs, NodeList, Point, Words, whole
 from jointfrf.workbench.cli.usage import UsageError
 
@@ -51,9 +51,7 @@ class ReadingArguments(Arguments):
     quantity: Literal["receptance", "mobility", "accelerance"] | None = option(
         "quantity of the FRFs, if the file does not state it"
     )
-    force_quantity: bool = option(
-        "use --quantity and --unit even if the file states another quantity or unit", default=False
-    )
+    force_quantity: bool = flag("use --quantity and --unit even if the file states another quantity or unit")
     unit: Annotated[str, Form("UNIT", _unit)] | None = option(
         "unit of the FRFs, if the file does not state one that is understood: g/N, mm/kN, 'dB re 1 m/N'; other units "
         "by name: frequency=kHz, phase=rad, coordinates=mm; several between commas"

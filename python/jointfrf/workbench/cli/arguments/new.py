@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from jointfrf.choices import CASE_KINDS
-from jointfrf.workbench.cli.arguments.declaration import Arguments, Form, one_of, option, positional
+from jointfrf.workbench.cli.arguments.declaration import Arguments, Form, flag, one_of, positional
 
 __all__ = ["ASSEMBLY", "STUDY", "NewArguments"]
 
@@ -27,4 +27,4 @@ class NewArguments(Arguments):
 
     kind: Annotated[str, Form("KIND", one_of(_KINDS), choices=_KINDS)] = positional("kind of the case", "KIND")
     folder: Path | None = positional("new folder of the case (default: my-KIND)", "FOLDER", optional=True)
-    schema: bool = option("print the JSON Schema of case.toml instead", default=False)
+    schema: bool = flag("print the JSON Schema of case.toml instead")

@@ -28,7 +28,7 @@ def _names(word: str) -> list[str]:
         else:
             found.append(part.strip())
     if not all(found):
-        raise argparse.ArgumentTypeError(f"{word!r} is no list of DOFs; use the form A/7:y,B/3:y")
+        raise argparse.ArgumentTypeError(f"{word!r} is no list of DOFs; use a form such as A/7:y")
     return found
 
 

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Annotated
 
-from jointfrf.workbench.cli.arguments.declaration import Arguments, Form, number, option, positional
+from jointfrf.workbench.cli.arguments.declaration import Arguments, Form, flag, number, option, positional
 from jointfrf.workbench.cli.arguments.words import NewFile, NewPage
 
 __all__ = ["PoolArguments", "PoolOnlyArguments"]
@@ -76,9 +76,7 @@ class PoolArguments(PoolOnlyArguments):
     parameters: Annotated[list[str], Form("NAME,...", _names)] | None = option(
         "parameters to be pooled, or loss factors (eta_y)", otherwise="all that the fits share"
     )
-    transfer: bool = option(
-        "test whether one joint explains all files, each of another structure, instead of pooling", default=False
-    )
+    transfer: bool = flag("test whether one joint explains all files, each of another structure, instead of pooling")
     spread: Annotated[float, Form("S", _share)] = option(
         "relative spread between assemblies that is no significant difference; needs --transfer", default=0.0
     )

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from jointfrf.workbench.cli.arguments.declaration import Arguments, option, positional
+from jointfrf.workbench.cli.arguments.declaration import Arguments, flag, option, positional
 from jointfrf.workbench.cli.arguments.words import Count, NewFolder
 
 __all__ = ["RunArguments", "RunOneArguments"]
@@ -13,7 +13,7 @@ class RunOneArguments(Arguments):
 
     realisations: Count | None = option("number of realisations", otherwise="the number in the case")
     at_most: Count | None = option("largest number of realisations of a case")
-    png: bool = option("write figures as PNG files, too", default=False)
+    png: bool = flag("write figures as PNG files, too")
 
 
 class RunArguments(RunOneArguments):

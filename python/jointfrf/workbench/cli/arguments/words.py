@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple
 
 from jointfrf.directions import direction_names
 from jointfrf.workbench.cli.arguments.declaration import Form, number
-from jointfrf.workbench.cli.usage import check_folder, check_frf_file, check_out, check_page
+from jointfrf.workbench.cli.usage import check_folder, check_frf_file, check_out
 
 __all__ = [
     "AboveZero",
@@ -168,6 +168,6 @@ above_zero = number(lambda found: found > 0, "is no number above zero; give one"
 AboveZero = Annotated[float, Form("NUMBER", above_zero)]
 Count = Annotated[int, Form("N", whole)]
 NewFile = Annotated[Path, Form("FILE", Path, check_folder)]
-NewPage = Annotated[Path, Form("FILE", Path, check_page)]
+NewPage = Annotated[Path, Form("FILE", Path, check_folder, packages=("jinja2",))]
 NewFrfs = Annotated[Path, Form("FILE", Path, check_frf_file)]
 NewFolder = Annotated[Path, Form("DIR", Path, check_out)]
