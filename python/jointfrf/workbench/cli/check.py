@@ -12,7 +12,8 @@ from jointfrf.workbench.cli.arguments.measured_file import PlaceArguments
 from jointfrf.workbench.cli.masses import check_masses, check_stated, scale_of_joint
 from jointfrf.workbench.cli.measured_file import in_some_band
 from jointfrf.workbench.cli.measured_joint import MeasuredJoint, measured_joint
-from jointfrf.workbench.cli.usage import Output, waiting
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import Output
 
 __all__ = ["check_joint", "run"]
 

@@ -30,7 +30,8 @@ from jointfrf.workbench.cli.frf import (
     own_matrix,
     read_structures,
 )
-from jointfrf.workbench.cli.usage import Output, UsageError, waiting, warn_of_ignored
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import Output, UsageError, warn_of_ignored
 
 __all__ = ["coupled_parts", "joint_channels_of", "renumbered", "run"]
 

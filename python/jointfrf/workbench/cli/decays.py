@@ -21,7 +21,8 @@ from jointfrf.workbench.amplitude.levels import JointLevels
 from jointfrf.workbench.assembly_file.read import AssemblyFile, read_assembly_file
 from jointfrf.workbench.cli.arguments.levels import DriveArguments, FilterArguments, LevelsArguments
 from jointfrf.workbench.cli.arguments.measured_file import BandArguments
-from jointfrf.workbench.cli.usage import UsageError, waiting, warn_of_ignored
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import UsageError, warn_of_ignored
 
 __all__ = ["check_decay_arguments", "levels_of_decays", "modes_csv", "modes_of_decay"]
 

@@ -20,7 +20,8 @@ from jointfrf.workbench.cli.arguments.decouple import DecoupleArguments
 from jointfrf.workbench.cli.arguments.words import Nodes, shown_nodes
 from jointfrf.workbench.cli.couple import joint_channels_of, renumbered
 from jointfrf.workbench.cli.frf import measured_sets, own_matrix, read_structures
-from jointfrf.workbench.cli.usage import Output, UsageError, listed, waiting, warn_of_ignored
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import Output, UsageError, listed, warn_of_ignored
 
 __all__ = ["run"]
 

@@ -24,7 +24,8 @@ from jointfrf.workbench.cases.keys import MOST_LINES
 from jointfrf.workbench.cli.arguments.frf import MOST_DOFS, FrfArguments, MatrixArguments
 from jointfrf.workbench.cli.arguments.measured_file import ReadingArguments
 from jointfrf.workbench.cli.arguments.structures import LineArguments
-from jointfrf.workbench.cli.usage import OptionWarning, Output, UsageError, listed, waiting, warn_of_ignored
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import OptionWarning, Output, UsageError, listed, warn_of_ignored
 from jointfrf.workbench.structures.substructures import ModelStructure
 
 __all__ = [

@@ -39,7 +39,8 @@ from jointfrf.workbench.cli.measured_file import (
     without_warnings_of_fits,
 )
 from jointfrf.workbench.cli.measured_joint import MeasuredJoint, measured_joint
-from jointfrf.workbench.cli.usage import Interrupt, Output, UsageError, plain, waiting, warn_of_ignored
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import Interrupt, Output, UsageError, plain, warn_of_ignored
 
 __all__ = ["run"]
 

@@ -41,8 +41,9 @@ from jointfrf.workbench.cli.decays import (
 )
 from jointfrf.workbench.cli.measured_file import stated_noise, without_warnings_of_fits
 from jointfrf.workbench.cli.measured_joint import measured_joint
+from jointfrf.workbench.cli.progress import waiting
 from jointfrf.workbench.cli.table_of_tests import labels_of, read_rows
-from jointfrf.workbench.cli.usage import Failures, Interrupt, Output, UsageError, waiting, warn_of_ignored
+from jointfrf.workbench.cli.usage import Failures, Interrupt, Output, UsageError, warn_of_ignored
 from jointfrf.workbench.report.levels_page import levels_csv, write_levels
 
 __all__ = ["run"]

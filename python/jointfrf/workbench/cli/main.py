@@ -17,7 +17,8 @@ from typing import Any, TextIO, cast
 from jointfrf.spelling import did_you_mean
 from jointfrf.workbench.cli.configuration import with_configuration
 from jointfrf.workbench.cli.parser import COMMANDS, command_parser, top_parser
-from jointfrf.workbench.cli.usage import EXPECTED, UsageError, complain, sentence, shown_progress, shown_warnings
+from jointfrf.workbench.cli.progress import shown_progress
+from jointfrf.workbench.cli.usage import EXPECTED, UsageError, complain, sentence, shown_warnings
 
 __all__ = ["main"]
 

@@ -19,7 +19,8 @@ from jointfrf.workbench.cases.known_joint.keys import KnownJointCase
 from jointfrf.workbench.cli.arguments.plan import GoalArguments, PartsArguments, PlanArguments
 from jointfrf.workbench.cli.frf import lines_of
 from jointfrf.workbench.cli.measured_file import noise_of
-from jointfrf.workbench.cli.usage import Output, UsageError, check_both, listed, waiting, warn_of_ignored
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import Output, UsageError, check_both, listed, warn_of_ignored
 from jointfrf.workbench.planning.assemblies import assemblies_needed
 from jointfrf.workbench.planning.joint_frfs import plan_joint_frfs
 from jointfrf.workbench.planning.plan import plan

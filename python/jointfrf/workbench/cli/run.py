@@ -18,7 +18,8 @@ from jointfrf.workbench.cases.catalogue import UnknownCaseError, find_case, list
 from jointfrf.workbench.cases.keys import Case
 from jointfrf.workbench.cases.workers import Workers, started_workers
 from jointfrf.workbench.cli.arguments.run import RunArguments, RunOneArguments
-from jointfrf.workbench.cli.usage import Output, UsageError, waiting
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import Output, UsageError
 from jointfrf.workbench.report.table import Table, as_text
 
 __all__ = ["run"]

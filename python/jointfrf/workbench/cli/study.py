@@ -12,7 +12,8 @@ from jointfrf.files import OwnFolder
 from jointfrf.parallel.pool import AnyExecutor, available_cores, check_processes, safe_environment
 from jointfrf.workbench.cases.catalogue import UnknownCaseError
 from jointfrf.workbench.cli.arguments.study import ComputingArguments, StudyArguments
-from jointfrf.workbench.cli.usage import Output, UsageError, listed, waiting, warn_of_ignored
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import Output, UsageError, listed, warn_of_ignored
 from jointfrf.workbench.studies.design import StudyDesign, parse_factor
 from jointfrf.workbench.studies.result import StudyResult
 from jointfrf.workbench.studies.run import merge_studies, study

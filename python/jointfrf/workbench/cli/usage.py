@@ -1,14 +1,11 @@
-"""What commands share: errors of usage, what they print, types of words, progress."""
+"""Errors of usage, messages in the words of the command line, printed results, files to be written, failed tests."""
 
 from __future__ import annotations
 
 import json
 import math
 import re
-import shutil
 import sys
-import threading
-import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
 from contextlib import contextmanager
@@ -17,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from jointfrf.extras import MissingPackageError, check_extras
 from jointfrf.spelling import cut, message, visible
+from jointfrf.workbench.cli.progress import clear_line
 
 if TYPE_CHECKING:
     from jointfrf.workbench.cli.arguments.declaration import Arguments
@@ -37,16 +35,9 @@ __all__ = [
     "listed",
     "plain",
     "sentence",
-    "shown_progress",
     "shown_warnings",
-    "waiting",
     "warn_of_ignored",
 ]
-
-#: Seconds after which the speed so far predicts the time left; a line that changes twice a second is easily read.
-_SETTLED = 0.5
-#: Seconds to the first line of progress on a stream that is no terminal, and between lines; characters of a bar.
-FIRST_LINE, _NEXT_LINE, _BAR = 3.0, 10.0, 20
 
 
 class UsageError(Exception):
@@ -99,7 +90,7 @@ _WORDS = tuple(
 
 def complain(kind: str, about: object) -> None:
     """Print a warning or an error as one line that does nothing to a terminal: a file may have any name."""
-    _LINE.clear()
+    clear_line()
     print(f"jointfrf: {kind}: {message(_in_options(cut(str(about))))}", file=sys.stderr)
 
 
@@ -161,7 +152,7 @@ class Output:
     def say(self, *lines: object) -> None:
         """Print lines of text, unless JSON or nothing is wanted."""
         if lines and not (self._is_json or self._is_quiet):
-            _LINE.clear()
+            clear_line()
             print(*(visible(str(line), "\n\t") for line in lines), sep="\n", flush=True)
 
     def warn(self, *texts: object) -> None:
@@ -176,7 +167,7 @@ class Output:
         if self._is_json:
             warned = [_in_options(cut(str(text))) for text in (*content.get("warnings", ()), *self._warned)]
             whole = {**content, "written": self.written, "warnings": list(dict.fromkeys(warned))}
-            _LINE.clear()
+            clear_line()
             print(json.dumps(plain(whole), indent=2, allow_nan=False))
 
 
@@ -249,128 +240,6 @@ def check_frf_file(option: str, path: Path) -> None:
     check_folder(option, path)
     if needed:
         check_extras(needed)
-
-
-class _Stage:
-    """A part of a command that takes time, and how much of it is done."""
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.start = self._counted_from = self._counted_at = time.monotonic()
-        self._done, self._total = 0, 0
-
-    def count(self, done: int, total: int) -> None:
-        """Note how much is done; a part is finished when all is, and the next one may begin.
-
-        Calls may come from several threads, in another order than their counts: progress is never taken back.
-        """
-        with _LOCK:
-            self._counted_at = time.monotonic()
-            if done == total:
-                self._counted_from, self._done, self._total = self._counted_at, 0, 0
-            elif done * self._total >= self._done * total:
-                self._done, self._total = done, total
-
-    @property
-    def share(self) -> float | None:
-        """Finished share of the stage; None if nothing counts."""
-        return self._done / self._total if self._total else None
-
-    def left(self, now: float) -> str:
-        """Return the finished share and the time left."""
-        if self.share is None:
-            return ""
-        spent = self._counted_at - self._counted_from
-        return f", {100 * self.share:.0f} %{_time_left(spent, now - self._counted_at, self._done, self._total)}"
-
-
-#: The stages under way, each within the one before it.
-_STAGES: list[_Stage] = []
-_LOCK = threading.RLock()
-
-
-class _Line:
-    """The line of a terminal that shows the progress: other text takes its place."""
-
-    is_there = False
-
-    def write(self, text: str) -> None:
-        with _LOCK:
-            print(
-                f"\r\x1b[K{visible(text)}"[: 3 + shutil.get_terminal_size().columns],
-                end="",
-                file=sys.stderr,
-                flush=True,
-            )
-            self.is_there = bool(text)
-
-    def clear(self) -> None:
-        if self.is_there:
-            self.write("")
-
-
-_LINE = _Line()
-
-
-def _progress_text(now: float, *, bar: bool) -> str:
-    """Return the innermost stage with its time, and the share of the innermost stage that counts."""
-    with _LOCK:
-        stages = _STAGES[:]
-    counted = next((one for one in reversed(stages) if one.share is not None), None)
-    text = f"{stages[-1].name}: {now - stages[-1].start:.0f} s"
-    if counted is None:
-        return text
-    filled = "#" * int(_BAR * (counted.share or 0.0))
-    return f"{f'[{filled:-<{_BAR}}] ' if bar else ''}{text}{counted.left(now)}"
-
-
-def _show_progress(ended: threading.Event) -> None:
-    """Show the stage under way: on a terminal all the time, elsewhere a line now and then."""
-    shown = time.monotonic() + FIRST_LINE - _NEXT_LINE
-    is_terminal = sys.stderr.isatty()
-    while not ended.wait(_SETTLED):
-        now = time.monotonic()
-        if is_terminal:
-            _LINE.write(_progress_text(now, bar=True))
-        elif now - shown >= _NEXT_LINE:
-            shown = now
-            print(f"jointfrf: {visible(_progress_text(now, bar=False))}", file=sys.stderr, flush=True)
-
-
-@contextmanager
-def shown_progress(command: str) -> Iterator[None]:
-    """Show what takes time inside, on standard error, until the end."""
-    ended = threading.Event()
-    clock = threading.Thread(target=_show_progress, args=(ended,), daemon=True)
-    with waiting(command):
-        clock.start()
-        try:
-            yield
-        finally:
-            ended.set()
-            clock.join()
-            _LINE.clear()
-
-
-@contextmanager
-def waiting(stage: str) -> Iterator[Callable[[int, int], None]]:
-    """Name the stage of a command that is under way; yields what takes the number done and their total."""
-    found = _Stage(stage)
-    with _LOCK:
-        _STAGES.append(found)
-    try:
-        yield found.count
-    finally:
-        with _LOCK:
-            _STAGES.remove(found)
-
-
-def _time_left(spent: float, since: float, done: int, total: int) -> str:
-    """Return the time left at the speed until the last count, some time since; nothing before the first count."""
-    if done == 0 or spent < _SETTLED:
-        return ""
-    left = max(0.0, spent * (total - done) / done - since)
-    return f", about {left:.0f} s left" if left < 90 else f", about {left / 60:.0f} min left"
 
 
 class Failures:
