@@ -32,7 +32,7 @@ from jointfrf.io.units import StatedUnits
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.toml.table import read_toml
 from jointfrf.workbench.assembly_file.side_part import PlacedChannel
-from jointfrf.workbench.cli.arguments.measured_file import JointArguments
+from jointfrf.workbench.cli.arguments.measured_file import JointArguments, PointArguments
 from jointfrf.workbench.cli.arguments.words import Nodes, shown_nodes
 from jointfrf.workbench.cli.measured_file import in_some_band
 from jointfrf.workbench.cli.usage import UsageError, check_both, listed
@@ -251,7 +251,8 @@ def measured_joint(
     """
     table = _table(args)
     known = {channel.node for channel in (*frfs.responses, *frfs.excitations)}
-    dofs = _checked_dofs(args, known, table)
+    points = args.points if isinstance(args, PointArguments) else None
+    dofs = _checked_dofs(args, points, known, table)
     if table is not None:
         places = _on_sides(table, args, known, frfs.source)
         nodes = _nodes_of(places, "j"), _nodes_of(places, "k")
@@ -266,14 +267,13 @@ def measured_joint(
         return MeasuredJoint(
             frfs.freq_hz, found.gamma(frfs), found.responses, found.forces, found, nodes, args.band, whole
         )
-    of_points = args.points is not None
     sides = (
-        _points(args.points, nodes, dofs)
-        if args.points is not None
+        _points(points, nodes, dofs)
+        if points is not None
         else _node_dofs(dofs, frfs, nodes) or _point_lines(args, frfs, nodes, dofs, bending_stiffness)
     )
     h = frfs.matrix(sides.channels, sides.channels, allow_missing=is_look)
-    return MeasuredJoint(frfs.freq_hz, h, sides, sides, None, nodes, args.band, is_of_points=of_points)
+    return MeasuredJoint(frfs.freq_hz, h, sides, sides, None, nodes, args.band, is_of_points=points is not None)
 
 
 def _points(points: list[str], nodes: tuple[list[int], list[int]], dofs: list[str]) -> Interface:
@@ -305,7 +305,7 @@ def _table(args: JointArguments) -> tuple[ChannelPlace, ...] | None:
     return places_of_table(table) if "channel" in table.content else None
 
 
-def _checked_dofs(args: JointArguments, known: set[int], table: object) -> list[str]:
+def _checked_dofs(args: JointArguments, points: list[str] | None, known: set[int], table: object) -> list[str]:
     """Return the DOFs of the joint; raise an error for options that are missing or contradict each other."""
     needs = {
         "--j": (args.j or table, "the nodes on side j of the joint, such as --j 101,102"),
@@ -318,7 +318,7 @@ def _checked_dofs(args: JointArguments, known: set[int], table: object) -> list[
         verb = "is" if len(missing) == 1 else "are"
         nodes = "" if missing == ["--dofs"] else f" ({args.source} has nodes {shown_nodes(known)})"
         raise UsageError(f"{listed(missing)} {verb} missing: {what}{nodes}")
-    if args.points is not None:
+    if points is not None:
         for name, value in (("--at", args.at), ("--spacing", args.spacing), ("a table of channels", table)):
             if value is not None:
                 raise UsageError(f"--points takes the nodes as joint points; leave out {name}")

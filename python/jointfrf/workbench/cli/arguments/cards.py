@@ -8,7 +8,7 @@ from jointfrf.spelling import did_you_mean
 from jointfrf.workbench.cli.arguments.declaration import Arguments, Form, flag, option
 from jointfrf.workbench.cli.arguments.words import Count, NewFile, nodes, numbers, words
 
-__all__ = ["CardArguments", "CardNodes", "CardProgram", "TermArguments"]
+__all__ = ["CardArguments", "CardNodes", "CardOptionArguments", "CardProgram", "TermArguments"]
 
 #: Nodes j and k of a joint, and ROT NODEs of CalculiX; of several joints by their names.
 CardNodes = list[int] | dict[str, list[int]]

@@ -14,7 +14,7 @@ from jointfrf.workbench.cli.arguments.measured_file import FileArguments, MassAr
 from jointfrf.workbench.cli.arguments.words import NewFile, Words, words
 from jointfrf.workbench.cli.usage import check_file_in_folder, check_out
 
-__all__ = ["FitArguments", "GainArguments", "IdentifyArguments", "SideArguments"]
+__all__ = ["GainArguments", "IdentifyArguments", "SideArguments", "TermsOfJointArguments"]
 
 #: Methods that need no model.
 _METHODS = ("compliance", "inverse-substructuring")

@@ -14,6 +14,7 @@ from jointfrf.workbench.cli.arguments.words import Band, Dofs, NodeList, Point, 
 from jointfrf.workbench.cli.usage import UsageError
 
 __all__ = [
+    "BandArguments",
     "FileArguments",
     "Floor",
     "FloorArguments",
@@ -21,6 +22,7 @@ __all__ = [
     "MassArguments",
     "NoiseArguments",
     "PlaceArguments",
+    "PointArguments",
     "ReadingArguments",
 ]
 
@@ -110,7 +112,6 @@ class JointArguments(PlaceArguments, BandArguments, ReadingArguments):
     """The joint in files, and how these are read: properties of a project."""
 
     files: list[Path] = field(default_factory=list)
-    points: list[str] | None = None
 
     @property
     def source(self) -> str:
@@ -118,16 +119,22 @@ class JointArguments(PlaceArguments, BandArguments, ReadingArguments):
         return ", ".join(path.name for path in self.files)
 
 
-class FileArguments(JointArguments):
-    """The files of one test, and the joint in them."""
+class PointArguments(Arguments):
+    """Several joint points."""
 
-    heading = "the joint in the file"
-    files: list[Path] = positional(
-        f"FRFs of the points around the joint: {format_names()}; several files of one test are merged", "FILE"
-    )
     points: Words | None = option(
         "names of several joint points, bolt1,bolt2: one node of --j and of --k for each, with all of --dofs in the "
         "file; the DOFs are named bolt1.x, ..."
+    )
+
+
+class FileArguments(JointArguments, PointArguments):
+    """The files of one test, and the joint in them."""
+
+    heading = "the joint in the file"
+
+    files: list[Path] = positional(
+        f"FRFs of the points around the joint: {format_names()}; several files of one test are merged", "FILE"
     )
 
 
