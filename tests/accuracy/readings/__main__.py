@@ -9,7 +9,7 @@ from pathlib import Path
 
 from jointfrf.workbench.cases.catalogue import UnknownCaseError, find_case, list_cases, read_case
 from jointfrf.workbench.cases.known_joint.keys import KnownJointCase
-from jointfrf.workbench.cli.usage import positive
+from jointfrf.workbench.cli.arguments.words import whole
 from jointfrf.workbench.report.table import as_text, table_csv
 
 from . import __doc__ as description
@@ -18,13 +18,13 @@ from .study import ReadingsPlan, group_cases, study_readings
 
 
 def numbers(words: str) -> tuple[float, ...]:
-    """Return positive numbers separated by commas."""
+    """Return whole numbers separated by commas."""
     try:
         found = tuple(float(word) for word in words.split(","))
     except ValueError:
         found = ()
     if not all(0 < one < math.inf for one in found or [0.0]):
-        raise argparse.ArgumentTypeError(f"must be positive numbers, separated by commas, not {words!r}")
+        raise argparse.ArgumentTypeError(f"must be whole numbers, separated by commas, not {words!r}")
     return found
 
 
@@ -37,10 +37,10 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--spacing", type=numbers, default=(0.15, 1.0, 2.0, 3.0, 5.0), metavar="HZ,...",
                         help="spacings of the lines; a finer one of a case stays")  # fmt: skip
     parser.add_argument("--level", type=numbers, default=(1.0,), metavar="X,...", help="shares of the printed level")
-    parser.add_argument("--realisations", type=positive, default=300, help="of each reading")
+    parser.add_argument("--realisations", type=whole, default=300, help="of each reading")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--top", type=positive, default=8, help="readings shown of each table")
-    parser.add_argument("--workers", type=positive, default=None, help="processes; one a core by default")
+    parser.add_argument("--top", type=whole, default=8, help="readings shown of each table")
+    parser.add_argument("--workers", type=whole, default=None, help="processes; one a core by default")
     parser.add_argument("--out", type=Path, help="write all readings as CSV files into this folder")
     args = parser.parse_args(words)
     try:
@@ -64,8 +64,8 @@ def main(words: Sequence[str] | None = None) -> None:
     print(*map(as_text, shown), sep="\n\n")
     if args.out is not None:
         args.out.mkdir(parents=True, exist_ok=True)
-        whole = *source_tables(explained), choices_table(every), altogether_table(every), values_table(explained)
-        for table in whole:
+        shown = *source_tables(explained), choices_table(every), altogether_table(every), values_table(explained)
+        for table in shown:
             (args.out / f"{table.key}.csv").write_text(table_csv(table), encoding="utf-8")
 
 

@@ -124,7 +124,7 @@ def test_one_test_in_several_files_with_all_that_is_written(tmp_path):
         "B/25:y": "22:+y",
     }
     assert content["fits"][0]["derived"]["eta_theta_z"]["value"] == pytest.approx(0.006, rel=0.2)
-    assert content["written"] == [str(path) for path in (cards, save, page)]
+    assert content["written"] == [str(path) for path in (save, cards, page)]
     loaded = jf.load(save)
     assert loaded.value["k_theta_z"] == content["fits"][0]["parameters"]["k_theta_z"]["value"]
     assert "PBUSH" in cards.read_text()
@@ -157,7 +157,7 @@ def test_cards_say_where_the_nodes_of_the_joint_lie_and_what_they_follow(couplin
     options = {"units": "mm-t-s"}
     lines = _place_of_joint(
         SimpleNamespace(parts=dict(zip("AB", parts, strict=True))),
-        CardRequest("nastran", [7, 8], options, False, False, None),
+        CardRequest("nastran", [7, 8], options, {}),
     )
     assert lines[-1] == "node 7 lies at (10, 0, 0), node 8 at (10, -2, 0) mm"
     assert len(lines) == said

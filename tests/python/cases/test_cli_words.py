@@ -23,7 +23,7 @@ import pytest
 from command import run_command
 from jointfrf.__main__ import main as started
 from jointfrf.errors import FrfCheckWarning
-from jointfrf.workbench.cli import usage
+from jointfrf.workbench.cli import progress, usage
 from jointfrf.workbench.cli.main import main
 from jointfrf.workbench.cli.parser import COMMANDS, command_parser
 from thinned_cases import DrawSome
@@ -757,11 +757,11 @@ class _Clock:
 
     def __init__(self, monkeypatch, is_terminal):
         self.now = 0.0
-        monkeypatch.setattr(usage.time, "monotonic", lambda: self.now)
-        monkeypatch.setattr(usage.sys.stderr, "isatty", lambda: is_terminal, raising=False)
+        monkeypatch.setattr(progress.time, "monotonic", lambda: self.now)
+        monkeypatch.setattr(progress.sys.stderr, "isatty", lambda: is_terminal, raising=False)
 
     def text(self, *, bar=False):
-        return usage._progress_text(self.now, bar=bar)
+        return progress._progress_text(self.now, bar=bar)
 
     def lines(self, times):
         """Show progress at these times, as the thread does."""
@@ -773,16 +773,16 @@ class _Clock:
                 self.now = self.now if following is None else following
                 return following is None
 
-        usage._show_progress(Ended())
+        progress._show_progress(Ended())
 
 
 def test_progress_has_stage_time_share_and_time_left(monkeypatch):
     clock = _Clock(monkeypatch, is_terminal=True)
-    with usage.waiting("identify"), usage.waiting("tests") as count:
+    with progress.waiting("identify"), progress.waiting("tests") as count:
         clock.now = 10.0
         assert clock.text() == "tests: 10 s"
         count(1, 4)
-        with usage.waiting("fit of a.uff"):
+        with progress.waiting("fit of a.uff"):
             clock.now = 20.0
             assert clock.text() == "fit of a.uff: 10 s, 25 %, about 20 s left"  # 10 s for each test, 10 s have passed
         count(2, 4)
@@ -794,12 +794,12 @@ def test_progress_has_stage_time_share_and_time_left(monkeypatch):
         assert clock.text() == "tests: 1000 s, 50 %, about 17 min left"
         count(6, 6)  # all of one part: the next may begin
         assert clock.text() == "tests: 1000 s"
-    assert not usage._STAGES
+    assert not progress._STAGES
 
 
 def test_progress_is_a_line_now_and_then(monkeypatch, capsys):
     clock = _Clock(monkeypatch, is_terminal=False)
-    with usage.waiting("plan"):
+    with progress.waiting("plan"):
         clock.lines([1.0, 2.9, 3.0, 8.0, 13.0, 13.5, 23.0])
     assert capsys.readouterr() == ("", "jointfrf: plan: 3 s\njointfrf: plan: 13 s\njointfrf: plan: 23 s\n")
 
@@ -807,7 +807,7 @@ def test_progress_is_a_line_now_and_then(monkeypatch, capsys):
 def test_progress_on_a_terminal_gives_way_to_text(monkeypatch, capsys):
     clock = _Clock(monkeypatch, is_terminal=True)
     monkeypatch.setenv("COLUMNS", "20")
-    with usage.waiting("a very long name of a stage"):
+    with progress.waiting("a very long name of a stage"):
         clock.lines([1.0])
         assert capsys.readouterr().err == "\r\x1b[Ka very long name of"[: 4 + 19]
         usage.complain("error", "no")
@@ -816,11 +816,11 @@ def test_progress_on_a_terminal_gives_way_to_text(monkeypatch, capsys):
 
 @pytest.mark.parametrize("quiet", [False, True])
 def test_every_command_that_takes_long_prints_its_stage(monkeypatch, capsys, quiet):
-    monkeypatch.setattr(usage, "FIRST_LINE", 0.0)
-    monkeypatch.setattr(usage, "_SETTLED", 0.01)
+    monkeypatch.setattr(progress, "FIRST_LINE", 0.0)
+    monkeypatch.setattr(progress, "_SETTLED", 0.01)
     printed = threading.Event()
-    text = usage._progress_text
-    monkeypatch.setattr(usage, "_progress_text", lambda *args, **options: printed.set() or text(*args, **options))
+    text = progress._progress_text
+    monkeypatch.setattr(progress, "_progress_text", lambda *args, **options: printed.set() or text(*args, **options))
     monkeypatch.setattr("jointfrf.workbench.cli.cases.run", lambda args: 0 if quiet or printed.wait(60) else 1)
     assert main(["cases", *(["--quiet"] if quiet else [])]) == 0
     assert capsys.readouterr() == ("", "" if quiet else "jointfrf: cases: 0 s\n")

@@ -34,7 +34,7 @@ def test_help_states_usage_defaults_and_examples(command):
     text = parser.format_help()
     usage = text.partition("\n\n")[0]
     assert "[--" not in usage
-    assert all(name in usage for names in parser.ways for name in names)
+    assert all(name in usage for names in parser.kind.ways for name in names)
     for action in parser.arguments:
         stated = re.findall(r"\(default[^)]*\)", action.help)
         value = action.default
@@ -45,8 +45,8 @@ def test_help_states_usage_defaults_and_examples(command):
         shown = f" {action.metavar} " if action.metavar else f"{{{','.join(map(str, action.choices or ()))}}}"
         if action.nargs != 0 and action.option_strings:
             assert shown.strip() in text
-    assert parser.examples
-    for example in parser.examples:
+    assert parser.kind.examples
+    for example in parser.kind.examples:
         assert example in text
         parser.parse_words(shlex.split(example.partition(" > ")[0])[2:])
 
@@ -58,7 +58,7 @@ def test_examples_of_the_help_run(tmp_path, monkeypatch):
     for command in COMMANDS:
         if command in ("run", "study"):  # of cases whose tests run elsewhere
             continue
-        for example in command_parser(command).examples:
+        for example in command_parser(command).kind.examples:
             words = shlex.split(example.partition(" > ")[0])[1:]
             if words[:2] == ["levels", "--table"]:  # of docs/levels.md, which is a test
                 continue

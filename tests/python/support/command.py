@@ -9,7 +9,7 @@ import warnings
 from typing import NamedTuple
 from unittest import mock
 
-from jointfrf.workbench.cli import usage
+from jointfrf.workbench.cli import progress
 from jointfrf.workbench.cli.main import main
 
 
@@ -28,7 +28,7 @@ def run_command(*words: object) -> Finished:
         contextlib.redirect_stdout(said),
         contextlib.redirect_stderr(complained),
         warnings.catch_warnings(),
-        mock.patch.object(usage, "FIRST_LINE", math.inf),  # a slow machine prints no progress
+        mock.patch.object(progress, "FIRST_LINE", math.inf),  # a slow machine prints no progress
     ):
         warnings.resetwarnings()
         for category in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):

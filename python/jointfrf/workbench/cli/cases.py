@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
-
 from jointfrf.workbench.cases.catalogue import case_title, key_page, list_cases
+from jointfrf.workbench.cli.arguments.cases import CasesArguments
 from jointfrf.workbench.cli.usage import Output
 
 __all__ = ["run"]
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: CasesArguments) -> int:
     """Carry out the command."""
     if options.keys:
         print(key_page(), end="")  # a page for a file, whatever else is asked for

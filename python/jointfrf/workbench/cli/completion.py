@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 from jointfrf.extras import import_extra
+from jointfrf.workbench.cli.arguments.completion import CompletionArguments
 from jointfrf.workbench.cli.parser import COMMANDS, command_parser, top_parser
 from jointfrf.workbench.cli.usage import Output
 
 __all__ = ["run"]
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: CompletionArguments) -> int:
     """Carry out the command."""
     shtab = import_extra("shtab")
     parser, commands = top_parser()

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -12,25 +12,28 @@ from jointfrf.channels.check.check import warn_of_sets
 from jointfrf.channels.virtual_point import append_virtual_point, channel_geometry, virtual_point
 from jointfrf.dofs import direction_places
 from jointfrf.errors import FileContentError
+from jointfrf.frf.merge import merge_frfs
 from jointfrf.identification.joint_file import read_joint_file
 from jointfrf.io import Channel, FrfSet, write_frfs
 from jointfrf.joint import Joint
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.substructuring.coupling import couple
-from jointfrf.workbench.cli.arguments.measured_file import Nodes
+from jointfrf.workbench.cli.arguments.couple import CoupleArguments
+from jointfrf.workbench.cli.arguments.measured_file import ReadingArguments
+from jointfrf.workbench.cli.arguments.structures import CouplingArguments
+from jointfrf.workbench.cli.arguments.words import Nodes
 from jointfrf.workbench.cli.frf import (
     CHANNEL_DIRECTIONS,
-    check_target,
     is_model,
     lines_of,
     measured_sets,
     own_matrix,
     read_structures,
 )
-from jointfrf.workbench.cli.measured_file import READING, reading_options
-from jointfrf.workbench.cli.usage import Output, UsageError, waiting, warn_of_ignored
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import Output, UsageError, warn_of_ignored
 
-__all__ = ["coupled", "joint_channels_of", "renumbered", "run", "shifted"]
+__all__ = ["coupled_parts", "joint_channels_of", "renumbered", "run"]
 
 
 def renumbered(frfs: FrfSet, add: int, shift: Sequence[float] = (0.0, 0.0, 0.0)) -> FrfSet:
@@ -43,39 +46,28 @@ def renumbered(frfs: FrfSet, add: int, shift: Sequence[float] = (0.0, 0.0, 0.0))
     return replace(frfs, responses=sides[0], excitations=sides[1], coordinates=places)
 
 
-def shifted(named: Nodes, add: int) -> Nodes:
-    """Return nodes with other numbers."""
-    return Nodes(tuple(node + add for node in named.numbers), frozenset(node + add for node in named.single))
-
-
 def joint_channels_of(node: int, dofs: Sequence[str]) -> list[Channel]:
     """Return the channels of a node in the directions of a joint."""
     return [Channel(node, CHANNEL_DIRECTIONS[place]) for place in direction_places(dofs)]
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: CoupleArguments) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
-    check_target(args.output)
-    found = read_joint_file(args.joint)
-    a, b = read_structures([args.a, args.b], lines_of(args), **reading_options(args))
     if is_model(args.a) and is_model(args.b):
-        warn_of_ignored(args, READING, "both substructures are models")
-    if args.band is not None:
-        a, b = a.select(args.band), b.select(args.band)
-    b = renumbered(b, args.renumber_b, args.shift_b)
-    k_side = shifted(args.k, args.renumber_b)
-    warn_of_sets(*measured_sets(args.a, a, args.b, b))
-    with waiting("coupling"):
-        assembly = coupled(a, b, found.joint, (args.j, k_side), args.at)
+        warn_of_ignored(args, ReadingArguments.names(), "both substructures are models")
+    assembly, joint, _ = coupled_parts(args)
     write_frfs(args.output, assembly)
     out.say(assembly.summary(), f"wrote {args.output}")
+    numbers: dict[str, object] = {"stiffness": joint.stiffness} if isinstance(joint, Joint) else {
+        "parameters": {one.name: one.value for one in joint.quantities}, "rigid": list(joint.rigid)
+    }  # fmt: skip
     out.give(
         {
             "written": str(args.output),
             "a": str(args.a),
             "b": str(args.b),
-            "joint": {"file": str(args.joint), "dofs": found.joint.dofs, **_numbers(found.joint)},
+            "joint": {"file": str(args.joint), "dofs": joint.dofs, **numbers},
             "channels": [str(channel) for channel in assembly.responses],
             "lines": assembly.freq_hz.size,
             "band_hz": [assembly.freq_hz[0], assembly.freq_hz[-1]],
@@ -84,14 +76,21 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _numbers(joint: Joint | LawJoint) -> dict[str, object]:
-    """Return the numbers of a joint for JSON."""
-    if isinstance(joint, Joint):
-        return {"stiffness": joint.stiffness}
-    return {"parameters": {one.name: one.value for one in joint.quantities}, "rigid": list(joint.rigid)}
+def coupled_parts(args: CouplingArguments, *files: Path) -> tuple[FrfSet, Joint | LawJoint, list[FrfSet]]:
+    """Return the FRFs of the assembly, its joint, and the FRFs of more files, merged, in the same band."""
+    joint = read_joint_file(args.joint).joint
+    a, b, *measured = read_structures([args.a, args.b, *files], lines_of(args), **args.reading())
+    measured = measured if len(measured) < 2 else [merge_frfs(measured)]
+    if args.band is not None:
+        a, b, *measured = (each.select(args.band) for each in (a, b, *measured))
+    b = renumbered(b, args.renumber_b, args.shift_b)
+    warn_of_sets(*measured_sets(args.a, a, args.b, b), *measured)
+    with waiting("coupling"):
+        assembly = _coupled(a, b, joint, (args.j, args.k.shifted(args.renumber_b)), args.at)
+    return assembly, joint, measured
 
 
-def coupled(
+def _coupled(
     a: FrfSet, b: FrfSet, joint: Joint | LawJoint, sides: tuple[Nodes, Nodes], at: tuple[float, ...] | None
 ) -> FrfSet:
     """Return the FRFs of the assembly at all channels of both."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 import warnings
-from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
 from jointfrf.channels.check.check import warn_of_sets
+from jointfrf.choices import StiffnessMethod
 from jointfrf.errors import FileContentError, IdentificationWarning
 from jointfrf.files import write_file
 from jointfrf.identification.band_means import identify_band_mean
@@ -16,64 +16,48 @@ from jointfrf.identification.record import fit_to_dict, save
 from jointfrf.identification.result import Fit
 from jointfrf.io import Channel, FrfSet
 from jointfrf.kernel.arguments import ComplexArray
-from jointfrf.workbench.cli.arguments.decouple import METHODS
-from jointfrf.workbench.cli.arguments.measured_file import Nodes, shown_nodes
-from jointfrf.workbench.cli.couple import joint_channels_of, renumbered, shifted
+from jointfrf.workbench.cli.arguments.decouple import DecoupleArguments
+from jointfrf.workbench.cli.arguments.words import Nodes, shown_nodes
+from jointfrf.workbench.cli.couple import joint_channels_of, renumbered
 from jointfrf.workbench.cli.frf import measured_sets, own_matrix, read_structures
-from jointfrf.workbench.cli.measured_file import reading_options
-from jointfrf.workbench.cli.usage import Output, UsageError, check_folder, listed, waiting, warn_of_ignored
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import Output, UsageError, listed, warn_of_ignored
 
 __all__ = ["run"]
 
 
-@dataclass(frozen=True)
-class _Side:
-    """One substructure: FRFs between its channels, and which of these are at the joint and which internal."""
-
-    h: ComplexArray
-    joint: list[int]
-    internal: list[int] | None
-
-
-def run(args: argparse.Namespace) -> int:
+def run(args: DecoupleArguments) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
     _check(args)
-    check_folder("--save", args.save)
-    check_folder("--output", args.output)
-    a, b, assembly = read_structures([args.a, args.b, args.assembly], None, **reading_options(args))
+    a, b, assembly = read_structures([args.a, args.b, args.assembly], None, **args.reading())
     b = renumbered(b, args.renumber_b)
-    k = shifted(args.k, args.renumber_b)
     s = None if args.s is None else [Channel(c.node + args.renumber_b, c.direction) for c in args.s]
-    at = {"r": args.r, "s": s}
     unused = [f"--{point}" for point in ("r", "s") if point not in args.equation]
     warn_of_ignored(args, unused, f"equation {args.equation} does not use {'it' if len(unused) == 1 else 'them'}")
     warn_of_sets(*measured_sets(args.a, a, args.b, b), assembly)
-    side_a = _side(a, args.j, args.dofs, args.r)
-    side_b = _side(b, k, args.dofs, s)
-    measured = assembly.matrix(at[args.equation[0]], at[args.equation[1]])
+    h_a, dofs_j, dofs_r = _side(a, args.j, args.dofs, args.r)
+    h_b, dofs_k, dofs_s = _side(b, args.k.shifted(args.renumber_b), args.dofs, s)
+    responses, forces = ((args.r if point == "r" else s) or [] for point in args.equation)
     with warnings.catch_warnings(), waiting("decoupling"):
         warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
         fit = identify_band_mean(
-            a.freq_hz, measured, METHODS[args.equation], args.dofs, args.band,
-            h_a=side_a.h, h_b=side_b.h, dofs_j=side_a.joint, dofs_k=side_b.joint,
-            dofs_r=side_a.internal, dofs_s=side_b.internal,
+            a.freq_hz, assembly.matrix(responses, forces), cast(StiffnessMethod, f"decoupling-{args.equation}"),
+            args.dofs, args.band, h_a=h_a, h_b=h_b, dofs_j=dofs_j, dofs_k=dofs_k, dofs_r=dofs_r, dofs_s=dofs_s,
         )  # fmt: skip
-    written = []
     if args.save is not None:
         save(fit, args.save)
-        written.append(args.save)
+        out.written.append(args.save)
     if args.output is not None:
         write_file(args.output, _line_table(fit))
-        written.append(args.output)
+        out.written.append(args.output)
     out.warn(*fit.warnings)
-    out.say(fit, *([""] if written else []), *(f"wrote {path}" for path in written))
-    fits = [fit_to_dict(fit, lines=False)]
-    out.give({"equation": args.equation, "fits": fits, "written": [str(path) for path in written]})
+    out.say(fit)
+    out.give({"equation": args.equation, "fits": [fit_to_dict(fit, lines=False)], "written": out.written})
     return 0
 
 
-def _check(args: argparse.Namespace) -> None:
+def _check(args: DecoupleArguments) -> None:
     """Check that all is named that the equation needs."""
     wanted = {"--j": args.j, "--k": args.k, "--dofs": args.dofs}
     wanted |= {f"--{point}": getattr(args, point) for point in dict.fromkeys(args.equation)}
@@ -89,24 +73,23 @@ def _check(args: argparse.Namespace) -> None:
             raise UsageError(f"{name} names nodes {shown_nodes(side.numbers)}; give one node")
 
 
-def _side(frfs: FrfSet, at: Nodes, dofs: list[str], internal: list[Channel] | None) -> _Side:
-    """Find the DOFs of a substructure at the joint and inside."""
+def _side(
+    frfs: FrfSet, at: Nodes, dofs: list[str], internal: list[Channel] | None
+) -> tuple[ComplexArray, list[int], list[int] | None]:
+    """Return FRFs between the channels of a substructure, and which of these are at the joint and which internal."""
     (node,) = at.among({channel.node for channel in (*frfs.responses, *frfs.excitations)}, frfs.source)
     names, h = own_matrix(frfs)
-    return _Side(
-        h,
-        _found(frfs, names, joint_channels_of(node, dofs)),
-        None if internal is None else _found(frfs, names, internal),
-    )
-
-
-def _found(frfs: FrfSet, names: tuple[Channel, ...], wanted: list[Channel]) -> list[int]:
-    for channel in wanted:
+    at_joint = joint_channels_of(node, dofs)
+    for channel in (*at_joint, *(internal or ())):
         if channel not in names:
             raise FileContentError(
                 f"{frfs.source} has no FRFs with {channel} as response and as excitation; name another channel"
             )
-    return [names.index(channel) for channel in wanted]
+    return (
+        h,
+        [names.index(one) for one in at_joint],
+        None if internal is None else [names.index(one) for one in internal],
+    )
 
 
 def _line_table(fit: Fit) -> str:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -20,10 +20,11 @@ from jointfrf.io.units import model_units
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.laws.law_joint import LawJoint
-from jointfrf.workbench.cli.arguments.export import CardNodes
-from jointfrf.workbench.cli.usage import Output, UsageError, check_folder, warn_of_ignored
+from jointfrf.workbench.cli.arguments.cards import CardArguments, CardNodes, CardOptionArguments, TermArguments
+from jointfrf.workbench.cli.arguments.export import ExportArguments
+from jointfrf.workbench.cli.usage import Output, UsageError, warn_of_ignored
 
-__all__ = ["CardRequest", "card_request", "page_nodes", "run", "written_cards"]
+__all__ = ["CardRequest", "card_request", "page_nodes", "run"]
 
 
 #: Arguments of `export` in its messages, and the options that stand for them.
@@ -59,7 +60,7 @@ def _table_lines(joint: Joint | LawJoint, low: float, high: float) -> FloatArray
     return freq
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: ExportArguments) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
     found = read_joint_file(args.joint)
@@ -70,20 +71,24 @@ def run(args: argparse.Namespace) -> int:
         warn_of_ignored(args, ("--frequency",), "no law of this joint depends on frequency")
     if args.nodes_at is None:
         warn_of_ignored(args, ("--joint-at",), "without --nodes-at the nodes are at the joint")
-    is_table = isinstance(args.frequency, tuple)
-    damping, cross = ("none", "zero") if is_table else _terms(_springs(found.joint, at))
-    request = card_request(args, found.joint.dofs, damping=damping, cross=cross, points=_points(args, found))
+    points = found.points
+    if args.joint_at is not None:
+        points = np.tile(args.joint_at, (2, 1)) * model_units(args.units).length
+    damping, cross = ("none", "zero") if isinstance(args.frequency, tuple) else _terms(_springs(found.joint, at))
+    request = card_request(args, found.joint.dofs, damping=damping, cross=cross, points=points)
     assert request is not None
-    if is_table and (isinstance(found.joint, Joint) or found.joint.laws):
+    if isinstance(args.frequency, tuple) and (isinstance(found.joint, Joint) or found.joint.laws):
         request.options["table_hz"] = _table_lines(found.joint, *args.frequency)
     if found.fit is not None:
-        text = written_cards(found.fit, request, found.about, at if found.fit.laws is not None else None)
+        text = request.cards(found.fit, found.about, at if found.fit.laws is not None else None)
     else:
         text = _by_hand(found, request, at)
-        if request.output is not None:
-            write_file(request.output, text)
-    written = [] if args.output is None else [str(args.output)]
-    out.say(f"wrote {args.output}" if written else text.rstrip("\n"))
+    if args.output is None:
+        out.say(text.rstrip("\n"))
+    else:
+        write_file(args.output, text)
+        out.say(f"wrote {args.output}")
+    written = [] if args.output is None else [args.output]
     out.give({"source": str(args.joint), "program": request.program, "cards": text, "written": written})
     return 0
 
@@ -93,29 +98,25 @@ def _by_hand(found: JointFile, request: CardRequest, freq_hz: float | None) -> s
     options: CardOptions = {**request.options, "comments": found.about}
     if isinstance(request.nodes, dict):
         raise UsageError("the file has one joint without a name; give its nodes as PROGRAM:J,K")
-    try:
+    with _in_words_of_options():
         if isinstance(found.joint, LawJoint):
             return found.joint.export(request.program, request.nodes, freq_hz=freq_hz, **options)
-        joint, left_out = (found.joint, ()) if request.all_damping else _without_negative(found.joint)
+        joint, left_out = (found.joint, ()) if request.terms["all_damping"] else _without_negative(found.joint)
         options["comments"] = [*found.about, *left_out]
         return joint.export(request.program, request.nodes, **options)
-    except ValueError as error:
-        raise UsageError(_refusal(str(error), "")) from error
 
 
 def _at_point(found: JointFile, point: str | None) -> JointFile:
-    """Return the one of several joint points that is named; the joint itself where it has no points."""
-    known = () if found.fit is None else found.fit.points
-    if point is None and not known:
+    """Return the named one of several joint points, or the joint itself if it has no points."""
+    if found.fit is None or not found.fit.points:
+        if point is not None:
+            raise UsageError("the file has no joint points; leave out --point")
         return found
-    if found.fit is None or point not in known:
-        raise UsageError(
-            f"--point is {point!r}; use one of {', '.join(known)}"
-            if known and point is not None
-            else "the file has no joint points; leave out --point"
-            if point is not None
-            else f"the file has joint points {', '.join(known)}; name one by --point, or all by PROGRAM:NAME=J,K:..."
-        )
+    known = ", ".join(found.fit.points)
+    if point is None:
+        raise UsageError(f"the file has joint points {known}, so name one by --point, or all by PROGRAM:NAME=J,K")
+    if point not in found.fit.points:
+        raise UsageError(f"--point is {point!r}; use one of {known}")
     fit = found.fit.at_point(point)
     return found._replace(fit=fit, joint=fit.joint, about=(*found.about, f"joint point {point}"))
 
@@ -140,10 +141,8 @@ def _springs(joint: Joint | LawJoint, freq_hz: float | None) -> Joint | None:
     """
     if isinstance(joint, Joint):
         return joint
-    try:
+    with _in_words_of_options():
         return LawJoint(joint.laws, per=joint.per).constant_joint(freq_hz) if joint.laws else None
-    except ValueError as error:
-        raise UsageError(_refusal(str(error), "")) from error
 
 
 def _terms(joint: Joint | None) -> tuple[str, str]:
@@ -156,14 +155,9 @@ def _terms(joint: Joint | None) -> tuple[str, str]:
     return kinds[bool(joint.damping.any()), bool(joint.hysteretic_stiffness.any())], "fit" if coupled else "zero"
 
 
-def _points(args: argparse.Namespace, found: JointFile) -> FloatArray | None:
-    if args.joint_at is not None:
-        return np.tile(args.joint_at, (2, 1)) * model_units(args.units).length
-    return found.points
-
-
-class CardRequest(NamedTuple):
-    """What is to be written, and where.
+@dataclass(frozen=True)
+class CardRequest:
+    """The cards that are wanted.
 
     Attributes
     ----------
@@ -171,32 +165,34 @@ class CardRequest(NamedTuple):
     nodes : list of int, or dict of these
         j and k; of several joints by their names, with ROT NODEs of CalculiX.
     options : CardOptions
-    all_damping, bounds : bool
-    output : Path or None
-        None: to be printed.
+    terms : dict of str to bool
+        Keywords of `cards`: which terms of a fit they contain.
     """
 
     program: CardFormat
     nodes: CardNodes
     options: CardOptions
-    all_damping: bool
-    bounds: bool
-    output: Path | None
+    terms: dict[str, bool]
+
+    def cards(self, fit: Fit, about: Sequence[str], freq_hz: float | None = None) -> str:
+        """Return the cards of a fit, laws at a frequency."""
+        with _in_words_of_options():
+            return cards(fit, self.program, self.nodes, about=about, freq_hz=freq_hz, **self.terms, **self.options)
 
 
-def page_nodes(args: argparse.Namespace) -> Sequence[int]:
-    """Return the nodes in the cards that a page shows: those of one joint, where they are named."""
+def page_nodes(args: CardArguments) -> Sequence[int]:
+    """Return the nodes in the cards that a page shows: the nodes of one joint, if they are named."""
     return (1, 2) if args.export is None or isinstance(args.export[1], dict) else args.export[1]
 
 
 def card_request(
-    args: argparse.Namespace, dofs: Sequence[str], *, damping: str, cross: str, points: FloatArray | None
+    args: CardArguments, dofs: Sequence[str], *, damping: str, cross: str, points: FloatArray | None
 ) -> CardRequest | None:
-    """Return what is to be written, after a look at whether the program can hold such a joint.
+    """Return the cards that are wanted, after a check whether the program can contain such a joint.
 
     Parameters
     ----------
-    args : Namespace
+    args : CardArguments
     dofs : sequence of str
         Joint DOFs.
     damping, cross : str
@@ -207,89 +203,65 @@ def card_request(
     Raises
     ------
     UsageError
-        The program cannot hold it, or a number is out of range.
+        The program cannot contain it, or a number is out of range.
     """
+    needing = ("--output", "--nodes-at", "--units", "--faces")
     if args.export is None:
-        for name in ("--output", "--nodes-at", "--units", "--faces"):
-            if name.removeprefix("--").replace("-", "_") in args.given:
-                raise UsageError(f"{name} is for cards; add --export PROGRAM:J,K")
-        flags = ("--element", "--property", "--full-matrix", "--connector", "--all-damping", "--bounds", "--no-damping",
-                 "--damping-nodes")  # fmt: skip
-        warn_of_ignored(args, flags, "no cards are written without --export PROGRAM:J,K")
+        for name in args.gave(needing):
+            raise UsageError(f"{name} is for cards; add --export PROGRAM:J,K")
+        others = [name for name in CardArguments.names() if name not in needing]
+        warn_of_ignored(args, others, "no cards are written without --export PROGRAM:J,K")
         return None
-    check_folder("--output", args.output)
     program, ends = args.export
     of_joints = ends if isinstance(ends, dict) else {}
-    _check_joints(args, dofs, of_joints)
-    options: CardOptions = {
-        "element": args.element,
-        "number": args.property,
-        "rotation_nodes": None if of_joints else ends[2:] or None,
-        "damping": not args.no_damping and (program != "calculix" or args.damping_nodes is not None),
-        "damping_nodes": args.damping_nodes,
-        "full_matrix": args.full_matrix,
-        "connector": args.connector,
-        "units": args.units,
-        "faces": args.faces,
-    }
+    pair = ends if isinstance(ends, list) else []
+    _check_joints(args, program, dofs, of_joints)
+    options = cast(CardOptions, args.keywords(CardOptionArguments))
+    options["rotation_nodes"] = pair[2:] or None
+    options["damping"] = not args.no_damping and (program != "calculix" or args.damping_nodes is not None)
     if args.nodes_at is not None:
         options["positions"] = np.array(args.nodes_at)
         if points is not None:
             options["points"] = points / model_units(args.units).length
-    request = CardRequest(program, of_joints or ends[:2], options, args.all_damping, args.bounds, args.output)
-    try:
-        for name, own in (of_joints or {"": ends}).items():
+    with _in_words_of_options(damping):
+        for name, own in (of_joints or {"": pair}).items():
             held = [dof for point, dof in map(point_and_direction, dofs) if point == name]
-            whole: CardOptions = {**options, "rotation_nodes": own[2:] or None}
-            _probe(len(held), held, damping, cross).export(program, own[:2], **whole)
-    except ValueError as error:
-        raise UsageError(_refusal(str(error), damping)) from error
-    return request
+            # A joint with every term that the one to be found may have.
+            matrix = np.eye(len(held)) + (0.1 if cross in ("fit", "points") else 0.0) * (1 - np.eye(len(held)))
+            viscous = matrix if damping in ("viscous", "both", "auto") else None
+            hysteretic = matrix if damping in ("hysteretic", "both", "auto") else None
+            probe = Joint(matrix, viscous, held, structural_damping=hysteretic)
+            probe.export(program, own[:2], **cast(CardOptions, {**options, "rotation_nodes": own[2:] or None}))
+    return CardRequest(program, of_joints or pair[:2], options, args.keywords(TermArguments))
 
 
-def _check_joints(args: argparse.Namespace, dofs: Sequence[str], of_joints: Mapping[str, list[int]]) -> None:
+def _check_joints(args: CardArguments, program: str, dofs: Sequence[str], of_joints: Mapping[str, list[int]]) -> None:
     """Raise an error unless each joint has its nodes, and only these."""
     known = list(dict.fromkeys(point for point, _ in map(point_and_direction, dofs)))
     if sorted(of_joints) != sorted(known) and (of_joints or len(known) > 1):
         example = ":".join(f"{name}={9001 + 2 * i},{9002 + 2 * i}" for i, name in enumerate(known) if name)
         raise UsageError(
             f"--export does not name the nodes of each joint ({', '.join(filter(None, known)) or 'unnamed'}); use "
-            + (f"{args.export[0]}:{example}" if example else f"{args.export[0]}:9001,9002")
+            f"{program}:{example or '9001,9002'}"
         )
     for name, given in (("--nodes-at", args.nodes_at), ("--faces", args.faces)):
         if of_joints and given is not None:
             raise UsageError(f"{name} takes one joint; use --save, then jointfrf export FILE PROGRAM:J,K --point NAME")
 
 
-def _probe(n: int, dofs: Sequence[str], damping: str, cross: str) -> Joint:
-    """Return a joint with every term that the one to be found may have."""
-    matrix = np.eye(n) + (0.1 if cross in ("fit", "points") else 0.0) * (1 - np.eye(n))
-    viscous = matrix if damping in ("viscous", "both", "auto") else None
-    hysteretic = matrix if damping in ("hysteretic", "both", "auto") else None
-    return Joint(matrix, viscous, dofs, structural_damping=hysteretic)
-
-
-def _refusal(why: str, damping: str) -> str:
-    """Return an error of an export in the words of the command line."""
-    if "MATRIX27" in why and damping:
-        may = f"--damping {damping} may find" if damping == "auto" else f"--damping {damping} fits"
-        return f"MATRIX27 of ansys has no hysteretic damping, which {may}; use --damping viscous, or --no-damping"
-    if "in rotation_nodes" in why:
-        return "calculix has rotations at ROT NODEs of rigid bodies only; name both, calculix:J,K,ROTJ,ROTK"
-    for argument, option in _OPTIONS:
-        why = why.replace(argument, option)
-    return why
-
-
-def written_cards(fit: Fit, request: CardRequest, about: Sequence[str], freq_hz: float | None = None) -> str:
-    """Return the cards of a fit, laws at a frequency, and write them where that is wanted."""
+@contextmanager
+def _in_words_of_options(damping: str = "") -> Iterator[None]:
+    """Turn errors of an export into errors of usage in the words of the command line."""
     try:
-        text = cards(
-            fit, request.program, request.nodes, about=about, all_damping=request.all_damping, bounds=request.bounds,
-            freq_hz=freq_hz, **request.options,
-        )  # fmt: skip
+        yield
     except ValueError as error:
-        raise UsageError(_refusal(str(error), "")) from error
-    if request.output is not None:
-        write_file(request.output, text)
-    return text
+        why = str(error)
+        if "MATRIX27" in why and damping:
+            may = f"--damping {damping} may find" if damping == "auto" else f"--damping {damping} fits"
+            why = f"MATRIX27 of ansys has no hysteretic damping, which {may}; use --damping viscous, or --no-damping"
+        elif "in rotation_nodes" in why:
+            why = "calculix has rotations at ROT NODEs of rigid bodies only; name both, calculix:J,K,ROTJ,ROTK"
+        else:
+            for argument, option in _OPTIONS:
+                why = why.replace(argument, option)
+        raise UsageError(why) from error

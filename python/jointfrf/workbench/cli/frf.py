@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import re
 import warnings
 from collections.abc import Mapping, Sequence
@@ -14,23 +13,23 @@ import numpy as np
 
 from jointfrf.dofs import DIRECTIONS, direction_places
 from jointfrf.errors import FileContentError, FileContentWarning
-from jointfrf.extras import check_extras
 from jointfrf.frf.merge import same_lines
 from jointfrf.io import Channel, FrfSet, read_frfs, write_frfs
-from jointfrf.io.formats import check_suffix, read_frf_sets
+from jointfrf.io.formats import read_frf_sets
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.toml.table import TomlTable, read_toml
 from jointfrf.workbench.assembly_file.modes import ModalStructure
 from jointfrf.workbench.assembly_file.read import read_structure
 from jointfrf.workbench.cases.keys import MOST_LINES
-from jointfrf.workbench.cli.arguments.frf import MATRICES, MOST_DOFS
-from jointfrf.workbench.cli.measured_file import READING, reading_options
-from jointfrf.workbench.cli.usage import OptionWarning, Output, UsageError, listed, waiting, warn_of_ignored
+from jointfrf.workbench.cli.arguments.frf import MOST_DOFS, FrfArguments, MatrixArguments
+from jointfrf.workbench.cli.arguments.measured_file import ReadingArguments
+from jointfrf.workbench.cli.arguments.structures import LineArguments
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import OptionWarning, Output, UsageError, listed, warn_of_ignored
 from jointfrf.workbench.structures.substructures import ModelStructure
 
 __all__ = [
     "CHANNEL_DIRECTIONS",
-    "check_target",
     "frfs_of_model",
     "is_model",
     "lines_of",
@@ -41,33 +40,28 @@ __all__ = [
 ]
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: FrfArguments) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
     if args.output is None:
         raise UsageError("--output is missing; name the file to write, such as --output model.uff")
-    check_target(args.output)
     structure = read_structure(_table(args))
     freq_hz = lines_of(args)
     if args.lines_of is not None:
         if freq_hz is not None:
             raise UsageError("--lines-of and --step both give lines; leave out one")
-        held = read_frfs(args.lines_of, **reading_options(args))
+        held = read_frfs(args.lines_of, **args.reading())
         freq_hz = (held if args.band is None else held.select(args.band)).freq_hz
     else:
-        warn_of_ignored(args, READING, "no file of FRFs is read without --lines-of")
+        warn_of_ignored(args, ReadingArguments.names(), "no file of FRFs is read without --lines-of")
     if freq_hz is None:
         raise UsageError("frequency lines are missing; add --band LOW:HIGH --step HZ, or --lines-of FILE")
     source = str(args.model or args.stiffness)
     with waiting("receptances"):
         frfs, named = frfs_of_model(structure, freq_hz, args.points, source)
     write_frfs(args.output, frfs)
-    out.say(
-        *_about(structure),
-        frfs.summary(),
-        *(f"node {number}: {name}" for name, number in named.items()),
-        f"wrote {args.output}",
-    )
+    nodes = (f"node {number}: {name}" for name, number in named.items())
+    out.say(*_about(structure), frfs.summary(), *nodes, f"wrote {args.output}")
     out.give(
         {
             "written": str(args.output),
@@ -81,21 +75,19 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _table(args: argparse.Namespace) -> TomlTable:
+def _table(args: FrfArguments) -> TomlTable:
     """Return the table of the model: that of the file, or one of the options."""
-    given: dict[str, Any] = {name: getattr(args, name) for name in MATRICES if getattr(args, name) is not None}
-    if "loss_factor" in args.given:
-        given["loss_factor"] = args.loss_factor
-    if args.dof_names is not None:
-        given["dofs"] = args.dof_names
+    given = {key: value for key, value in args.keywords(MatrixArguments).items() if value is not None}
+    if "loss_factor" not in args.given:
+        del given["loss_factor"]
     if args.model is not None:
         if given:
             raise UsageError("MODEL and options for matrices are both given; leave out one")
         if not is_model(args.model):
             raise UsageError(f"{args.model} is no TOML file of a model; convert FRFs by jointfrf convert")
         return read_toml(args.model)
-    missing = [name for name, key in (("--stiffness", "stiffness"), ("--mass", "mass"), ("--dof-names", "dofs"))
-               if key not in given]  # fmt: skip
+    needed = {"--stiffness": args.stiffness, "--mass": args.mass, "--dof-names": args.dof_names}
+    missing = [name for name, value in needed.items() if value is None]
     if missing:
         raise UsageError(f"no model is given; name its TOML file, or add {listed(missing)}")
     return TomlTable({"model": "matrices", **given}, "options")
@@ -106,29 +98,7 @@ CHANNEL_DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _TURNS = re.compile(r"m?theta|phi|rot")
 
 
-def check_target(target: Path) -> None:
-    """Check that FRFs can be written to a path.
-
-    Raises
-    ------
-    UsageError
-        Its suffix is that of no format, there is no such folder, or it is one.
-    MissingPackageError
-        A package for the format is not installed.
-    """
-    try:
-        needed = check_suffix(target).package
-    except ValueError as error:
-        raise UsageError(error) from error
-    if not target.parent.is_dir():
-        raise UsageError(f"folder {target.parent} does not exist; create it, or name another file")
-    if target.is_dir():
-        raise UsageError(f"{target} is a folder; name a file")
-    if needed:
-        check_extras(needed)
-
-
-def lines_of(args: argparse.Namespace) -> FloatArray | None:
+def lines_of(args: LineArguments) -> FloatArray | None:
     """Return evenly spaced lines of the options, Hz; None where there is no step."""
     if args.step is None:
         return None
@@ -142,12 +112,11 @@ def lines_of(args: argparse.Namespace) -> FloatArray | None:
     count = int(np.floor((high - low) / args.step * (1 + 1e-12))) + 1
     if count > MOST_LINES:
         raise UsageError(f"--band and --step give {count} lines; use at most {MOST_LINES}")
-    lines: FloatArray = low + args.step * np.arange(count)
-    return lines
+    return np.asarray(low + args.step * np.arange(count), np.float64)
 
 
 def is_model(path: Path) -> bool:
-    """Whether a file is that of a model."""
+    """Whether a file describes a model."""
     return path.suffix.lower() == ".toml"
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import argparse
 import warnings
 from collections.abc import Iterator
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,65 +13,59 @@ from jointfrf.channels.check.check import stop_at_errors
 from jointfrf.channels.check.result import FrfCheck
 from jointfrf.channels.point_lines import difference_error
 from jointfrf.dofs import is_rotation
-from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
-from jointfrf.extras import check_extras
+from jointfrf.errors import FrfCheckWarning
 from jointfrf.frf.noise_model import estimate_noise
 from jointfrf.identification.band_means import identify_band_mean
 from jointfrf.identification.identify import identify
-from jointfrf.identification.record import fit_to_dict, write_record
+from jointfrf.identification.record import fit_to_dict
 from jointfrf.identification.result import Fit
 from jointfrf.identification.side_models import SideModel
-from jointfrf.io import FrfSet
+from jointfrf.io import FrfSet, read_frfs
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.workbench.assembly_file.side_part import SidePart, read_side
-from jointfrf.workbench.cli.arguments.measured_file import shown_nodes
+from jointfrf.workbench.cli.arguments.identify import GainArguments, IdentifyArguments
+from jointfrf.workbench.cli.arguments.measured_file import NoiseArguments
+from jointfrf.workbench.cli.arguments.words import shown_nodes
 from jointfrf.workbench.cli.check import check_joint
-from jointfrf.workbench.cli.export import CardRequest, card_request, page_nodes, written_cards
+from jointfrf.workbench.cli.export import card_request
+from jointfrf.workbench.cli.fit_results import write_results
 from jointfrf.workbench.cli.identify_model import run_model
 from jointfrf.workbench.cli.joint_laws import joint_of_laws
 from jointfrf.workbench.cli.masses import check_masses, check_stated, scale_of_fit
-from jointfrf.workbench.cli.measured_file import file_names, in_some_band, read_measured, setups_with_gains
-from jointfrf.workbench.cli.measured_joint import MeasuredJoint, measured_joint
-from jointfrf.workbench.cli.noise import stated_noise
-from jointfrf.workbench.cli.usage import (
-    Interrupt,
-    Output,
-    UsageError,
-    check_folder,
-    check_out,
-    plain,
-    waiting,
-    warn_of_ignored,
+from jointfrf.workbench.cli.measured_file import (
+    in_some_band,
+    setups_with_gains,
+    stated_noise,
+    without_warnings_of_fits,
 )
-from jointfrf.workbench.report.fit_page import write_report
+from jointfrf.workbench.cli.measured_joint import MeasuredJoint, measured_joint
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import Interrupt, Output, UsageError, plain, warn_of_ignored
 
 __all__ = ["run"]
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: IdentifyArguments) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
-    _check_results(args)
+    if args.report is not None and "compliance" not in args.method:
+        raise UsageError("--report needs method compliance; add it to --method")
     if args.model is not None:
         _refuse(args, ("points", "same"), "is for FRFs at the joint; leave it out with --model")
-        return run_model(args)
+        return run_model(args, args.model)
     _refuse(args, ("each", "find_wrong_channels"), "needs --model; name the assembly.toml")
     out = Output(args)
-    _check_points(args)
-    _check_window(args)
-    check_stated(args)
-    stated_noise(args)
-    with waiting(f"reading {file_names(args)}"):
-        measured = read_measured(args)
+    _check_options(args)
+    with waiting(f"reading {args.source}"):
+        measured = read_frfs(*args.files, **args.reading())
         frfs = measured.receptance(args.window_decay or 0.0)
     joint = measured_joint(args, frfs, args.bending_stiffness)
     laws = joint_of_laws(args, joint.dofs)
     sides = _sides(args, frfs, joint)
-    points = np.array(joint.responses.references)
-    damping = args.damping if laws is None else "none"
-    request = card_request(args, joint.dofs, damping=damping, cross=args.cross, points=points)
+    request = card_request(args, joint.dofs, damping=args.damping if laws is None else "none", cross=args.cross,
+                           points=np.array(joint.responses.references))  # fmt: skip
     with waiting("data checks"):
         check = check_joint(joint, measured)
-    stop_at_errors(check.findings, args.accept or ())
+    stop_at_errors(check.findings, args.accept)
     _warn(args, joint, check)
     _warn_of_far_points(frfs, joint)
     out.say(*_heading(args, frfs, joint), *(line for side in sides for line in side.text))
@@ -87,40 +79,36 @@ def run(args: argparse.Namespace) -> int:
             unknown = check_masses(args, scale, sides)
             out.say("", fits[-1], *scale.text(), *(f"warning: {text}" for text in unknown))
             out.warn(*fits[-1].warnings, *unknown)
+    references = joint.responses.references
+    record = {} if joint.is_of_points else {"reference_points_m": plain(dict(zip("jk", references, strict=True)))}
     with waiting("results"):
-        text, written = _write_results(args, frfs, joint, fits, request)
-    if text and args.output is None:
-        out.say("", text.rstrip("\n"))
-    out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
-    out.give(_content(args, joint, check, fits, text, written))
+        figures = _noise_figures(args, frfs, joint) if args.out is not None else []
+        text = write_results(args, fits, out, request, _places(joint), record=record, figures=figures)
+    out.give(
+        {
+            "sources": args.files,
+            "joint": joint.to_dict(),
+            "checks": check.to_dict(),
+            "warnings": [*joint.warnings(check), *(text for fit in fits for text in fit.warnings)],
+            "fits": [fit_to_dict(fit, lines=False) for fit in fits],
+            "scales": [asdict(scale_of_fit(fit)) for fit in fits],
+            "cards": text,
+            "written": out.written,
+        }
+    )
     interrupt.resume()
     return 0
 
 
-def _check_results(args: argparse.Namespace) -> None:
-    """Raise an error for results that cannot be written, before anything is read."""
-    if args.out is not None:
-        check_extras("matplotlib")
-        check_out("--out", args.out)
-    if args.report is not None:
-        check_extras("jinja2")
-        if "compliance" not in args.method:
-            raise UsageError("--report needs method compliance; add it to --method")
-        check_out("--report", args.report.parent)
-        if args.report.is_dir():
-            raise UsageError(f"--report: {args.report} is a folder; name a file")
-    check_folder("--save", args.save)
-
-
-def _refuse(args: argparse.Namespace, names: tuple[str, ...], why: str) -> None:
+def _refuse(args: IdentifyArguments, names: tuple[str, ...], why: str) -> None:
     """Raise an error for the first of these options that is given."""
     for name in names:
         if getattr(args, name):
             raise UsageError(f"--{name.replace('_', '-')} {why}")
 
 
-def _check_points(args: argparse.Namespace) -> None:
-    """Raise an error for options that do not go with the number of joint points."""
+def _check_options(args: IdentifyArguments) -> None:
+    """Raise an error for options that do not go together, before a file is read."""
     if args.save is None:
         warn_of_ignored(args, ("--save-lines",), "nothing is saved without --save")
     if args.points is None:
@@ -132,10 +120,6 @@ def _check_points(args: argparse.Namespace) -> None:
         if unknown:
             raise UsageError(f"unknown joint point {unknown[0]} in --same; use names of --points")
         _refuse(args, ("side_j", "side_k"), "is for one joint point; leave out --points")
-
-
-def _check_window(args: argparse.Namespace) -> None:
-    """Raise an error for options that do not go with an exponential window."""
     if args.window_decay is not None and not args.window_decay >= 0:
         raise UsageError(f"--window-decay must not be negative, not {args.window_decay:g}")
     if args.window_decay:
@@ -143,28 +127,18 @@ def _check_window(args: argparse.Namespace) -> None:
         _refuse(args, ("law", "joint", "side_j", "side_k"), why)
         if args.method != ["compliance"]:
             raise UsageError(f"--method {','.join(args.method)} {why}")
+    check_stated(args)
+    stated_noise(args)
 
 
-def _warn(args: argparse.Namespace, joint: MeasuredJoint, check: FrfCheck) -> None:
+def _warn(args: IdentifyArguments, joint: MeasuredJoint, check: FrfCheck) -> None:
     """Warn of DOFs that the joint leaves out, and of options that are not used."""
     for text in joint.warnings(check):
         warnings.warn(text, FrfCheckWarning, stacklevel=3)
     if "compliance" not in args.method:
-        warn_of_ignored(
-            args,
-            (
-                "--damping",
-                "--cross",
-                "--noise",
-                "--floor",
-                "--setup-gain",
-                "--common-gain",
-                "--sensor-mass",
-                "--window-decay",
-                "--position-error",
-            ),
-            f"method {args.method[0]} uses no such option",
-        )
+        unused = ("--damping", "--cross", *NoiseArguments.names(), *GainArguments.names(), "--sensor-mass",
+                  "--window-decay", "--position-error")  # fmt: skip
+        warn_of_ignored(args, unused, f"method {args.method[0]} uses no such option")
     if joint.channels is not None or len(joint.nodes[0]) == 1:
         warn_of_ignored(args, ("--bending-stiffness",), "no rotation is found by differences along a line")
 
@@ -191,61 +165,19 @@ def _warn_of_far_points(frfs: FrfSet, joint: MeasuredJoint) -> None:
         warnings.warn(text, FrfCheckWarning, stacklevel=3)
 
 
-def _write_results(
-    args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, fits: list[Fit], request: CardRequest | None
-) -> tuple[str, list[Path]]:
-    """Write what the options ask for; return the cards and the files written."""
-    text, written = "", []
-    if args.save is not None:
-        _save(args.save, fits[0], file_names(args), joint, lines=args.save_lines)
-        written.append(args.save)
-    if request is not None:
-        text = written_cards(fits[0], request, [f"from {file_names(args)}", *_places(joint)])
-        written += [] if args.output is None else [args.output]
-    finished = dict(zip(args.method, fits, strict=False))
-    if args.report is not None and "compliance" in finished:
-        fit = finished["compliance"]
-        args.report.parent.mkdir(parents=True, exist_ok=True)
-        written.append(write_report(fit, args.report, source=file_names(args), command=args.typed,
-                                    nodes=page_nodes(args)))  # fmt: skip
-    if args.out is not None:
-        written += _write_figures(args, frfs, joint, fits)
-    return text, written
-
-
-def _content(
-    args: argparse.Namespace,
-    joint: MeasuredJoint,
-    check: FrfCheck,
-    fits: list[Fit],
-    text: str,
-    written: list[Path],
-) -> dict[str, Any]:
-    return {
-        "sources": [str(path) for path in args.files],
-        "joint": joint.to_dict(),
-        "checks": check.to_dict(),
-        "warnings": [*joint.warnings(check), *(text for fit in fits for text in fit.warnings)],
-        "fits": [fit_to_dict(fit, lines=False) for fit in fits],
-        "scales": [asdict(scale_of_fit(fit)) for fit in fits],
-        "cards": text or None,
-        "written": [str(path) for path in written],
-    }
-
-
-def _heading(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint) -> Iterator[str]:
+def _heading(args: IdentifyArguments, frfs: FrfSet, joint: MeasuredJoint) -> Iterator[str]:
     """Say what is identified from what."""
     points = " and ".join(
         shown_nodes(side) if joint.channels is not None else ", ".join(map(str, side)) for side in joint.nodes
     )
     size = f"{frfs.h.shape[1]} responses x {frfs.h.shape[2]} excitations"
-    yield f"{file_names(args)}: {size}; joint between points {points}"
+    yield f"{args.source}: {size}; joint between points {points}"
     yield from joint.text()
     if joint.channels is None and len(joint.nodes[0]) > 1 and not joint.is_of_points:
         yield from _differences(args, joint)
 
 
-def _differences(args: argparse.Namespace, joint: MeasuredJoint) -> Iterator[str]:
+def _differences(args: IdentifyArguments, joint: MeasuredJoint) -> Iterator[str]:
     """Say what the central differences do to a rotational joint stiffness, before the result is read."""
     rotations = [i for i, dof in enumerate(joint.dofs) if is_rotation(dof)]
     if not rotations:
@@ -260,7 +192,7 @@ def _differences(args: argparse.Namespace, joint: MeasuredJoint) -> Iterator[str
         )
 
 
-def _sides(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint) -> list[SidePart]:
+def _sides(args: IdentifyArguments, frfs: FrfSet, joint: MeasuredJoint) -> list[SidePart]:
     """Read the models of both sides; none where none are named."""
     paths = [path for path in (args.side_j, args.side_k) if path is not None]
     if not paths:
@@ -278,54 +210,33 @@ def _sides(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint) -> list
 
 
 def _fit(
-    args: argparse.Namespace,
+    args: IdentifyArguments,
     method: str,
     frfs: FrfSet,
     joint: MeasuredJoint,
     laws: LawJoint | None,
     sides: tuple[SideModel, ...],
 ) -> Fit:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", IdentificationWarning)  # they are in the table
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        warnings.simplefilter("ignore", FrfCheckWarning)  # printed with the names of the channels
-        if method == "compliance":
-            options = _of_compliance(args, frfs, joint, laws)
-            if sides:
-                options["sides"] = sides
-            return identify(frfs.freq_hz, joint.h, joint.dofs, args.band, **options)
-        transform = joint.responses if joint.is_square else None
-        return identify_band_mean(
-            frfs.freq_hz, _square(joint), "inverse-substructuring", joint.dofs, args.band, transform=transform
-        )
-
-
-def _square(joint: MeasuredJoint) -> np.ndarray:
-    """FRFs as means over bands take them, which know one transform only."""
-    if joint.is_square:
-        return joint.h
-    return np.ascontiguousarray(joint.responses.transform @ joint.h @ joint.forces.transform.T)
-
-
-def _of_compliance(
-    args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, laws: LawJoint | None
-) -> dict[str, Any]:
-    """Return the options of the compliance fit: what is known of the channels, damping, cross terms, noise."""
-    noise = stated_noise(args)
-    known = joint.known(frfs, is_noise_stated=noise is not None)
-    terms = {"damping": args.damping, "cross": args.cross} if laws is None else {"joint": laws}
-    if args.same is not None:
-        terms["same"] = args.same
-    return {
-        **known,
-        "noise": noise,
-        "setups": setups_with_gains(args, known["setups"], joint.h.shape),
-        "accept": args.accept or (),
-        "sensor_mass": args.sensor_mass,
-        **({"window_decay": args.window_decay} if args.window_decay is not None else {}),
-        **({"position_error": args.position_error} if args.position_error is not None else {}),
-        **terms,
-    }
+    with without_warnings_of_fits():
+        if method != "compliance":
+            # Means over bands take one transform only.
+            h, transform = joint.h, joint.responses if joint.is_square else None
+            if transform is None:
+                h = np.ascontiguousarray(joint.responses.transform @ joint.h @ joint.forces.transform.T)
+            return identify_band_mean(
+                frfs.freq_hz, h, "inverse-substructuring", joint.dofs, args.band, transform=transform
+            )
+        noise = stated_noise(args)
+        options = joint.known(frfs, is_noise_stated=noise is not None)
+        options["setups"] = setups_with_gains(args, args.source, options["setups"], joint.h.shape)
+        options |= {"damping": args.damping, "cross": args.cross} if laws is None else {"joint": laws}
+        optional = {"same": args.same, "window_decay": args.window_decay, "position_error": args.position_error,
+                    "sides": sides or None}  # fmt: skip
+        options |= {name: value for name, value in optional.items() if value is not None}
+        return identify(
+            frfs.freq_hz, joint.h, joint.dofs, args.band, noise=noise, accept=args.accept,
+            sensor_mass=args.sensor_mass, **options,
+        )  # fmt: skip
 
 
 def _places(joint: MeasuredJoint) -> list[str]:
@@ -337,20 +248,12 @@ def _places(joint: MeasuredJoint) -> list[str]:
     return [f"reference points x, y, z = {both[0]} m (j) and {both[1]} m (k)"]
 
 
-def _save(path: Path, fit: Fit, source: str, joint: MeasuredJoint, *, lines: bool) -> None:
-    about: dict[str, Any] = {"source": source}
-    if not joint.is_of_points:
-        about["reference_points_m"] = plain(dict(zip("jk", joint.responses.references, strict=True)))
-    write_record(path, fit_to_dict(fit, lines=lines) | about)
-
-
-def _write_figures(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, fits: list[Fit]) -> list[Path]:
-    from jointfrf.workbench.report.fit import write_fit
+def _noise_figures(args: IdentifyArguments, frfs: FrfSet, joint: MeasuredJoint) -> list[Any]:
+    """Return the figure of the noise that a fit has estimated."""
+    if "compliance" not in args.method or args.noise is not None:
+        return []
     from jointfrf.workbench.report.receptance import noise_figure
 
-    figures = []
-    if "compliance" in args.method and args.noise is None:
-        freq_hz, h = in_some_band(frfs.freq_hz, joint.h, args.band)
-        names = [[str(channel) for channel in side.channels] for side in (joint.responses, joint.forces)]
-        figures.append(noise_figure(freq_hz, h, estimate_noise(freq_hz, h), *names))
-    return write_fit(fits, args.out, file_names(args), figures)
+    freq_hz, h = in_some_band(frfs.freq_hz, joint.h, args.band)
+    names = [[str(channel) for channel in side.channels] for side in (joint.responses, joint.forces)]
+    return [noise_figure(freq_hz, h, estimate_noise(freq_hz, h), *names)]

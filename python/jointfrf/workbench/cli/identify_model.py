@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 import csv
 import io
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,64 +12,60 @@ from typing import Any
 import numpy as np
 
 from jointfrf.channels.check.check import stop_at_errors, wrong_numbers
-from jointfrf.errors import ConvergenceWarning, FileContentError, FrfCheckWarning, IdentificationWarning
+from jointfrf.errors import FileContentError
 from jointfrf.files import write_file
-from jointfrf.identification.record import fit_to_dict, write_record
+from jointfrf.identification.record import fit_to_dict
 from jointfrf.identification.result import UNDETERMINED, Fit, columns_of, is_undetermined
-from jointfrf.io import FrfSet
+from jointfrf.io import FrfSet, read_frfs
 from jointfrf.io.units import model_units
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.messages.finding import messages_of
 from jointfrf.spelling import some_of
 from jointfrf.workbench.assembly_file.measured import MeasuredAssembly, measured_assembly
-from jointfrf.workbench.cli.export import CardRequest, card_request, page_nodes, written_cards
-from jointfrf.workbench.cli.measured_file import file_names, read_measured, setups_with_gains
-from jointfrf.workbench.cli.noise import stated_noise
-from jointfrf.workbench.cli.usage import Failures, Interrupt, Output, UsageError, listed, waiting
+from jointfrf.workbench.cli.arguments.identify import IdentifyArguments, SideArguments, TermsOfJointArguments
+from jointfrf.workbench.cli.arguments.measured_file import PlaceArguments
+from jointfrf.workbench.cli.export import CardRequest, card_request
+from jointfrf.workbench.cli.fit_results import write_results
+from jointfrf.workbench.cli.measured_file import setups_with_gains, stated_noise, without_warnings_of_fits
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import Failures, Interrupt, Output, UsageError, listed
 from jointfrf.workbench.report.fit_model import next_sentences
-from jointfrf.workbench.report.fit_page import write_report
 
 __all__ = ["run_model"]
 
-#: What belongs to FRFs between all DOFs of the joint, and means nothing where there are models: option, attribute.
-_OF_THE_JOINT = (
-    ("--j", "j"), ("--k", "k"), ("--dofs", "dofs"), ("--at", "at"), ("--at-k", "at_k"), ("--channels", "channels"),
-    ("--spacing", "spacing"), ("--axis", "axis"), ("--law", "law"), ("--joint", "joint"),
-    ("--position-error", "position_error"), ("--bending-stiffness", "bending_stiffness"),
-    ("--side-j", "side_j"), ("--side-k", "side_k"),
-    ("--window-decay", "window_decay"), ("--mass-j", "mass_j"), ("--mass-k", "mass_k"), ("--mass", "mass"),
-)  # fmt: skip
 #: Characters of a line of the table of several tests.
 _WIDTH = 100
 
 
-def run_model(args: argparse.Namespace) -> int:
+def run_model(args: IdentifyArguments, model: Path) -> int:
     """Carry out the command with --model; the caller turns exceptions into messages."""
-    _check_options(args)
-    return _run_each(args) if args.each else _run_one(args)
-
-
-def _run_one(args: argparse.Namespace) -> int:
-    """Fit one test."""
+    given = [name for group in (PlaceArguments, SideArguments, TermsOfJointArguments) for name in args.changed(group)]
+    if given:
+        verb, pronoun = ("is", "it") if len(given) == 1 else ("are", "them")
+        raise UsageError(
+            f"{listed(given)} {verb} for fits without models; leave {pronoun} out, since {model} defines the joint"
+        )
+    if args.each and args.export is not None and args.output is None:
+        raise UsageError("--export of several tests needs files; add --output")
     out = Output(args)
-    _, content, written = _one(args, out)
-    out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
-    out.give({"model": str(args.model), **content, "written": [str(path) for path in written]})
+    if args.each:
+        return _run_each(args, out)
+    _, content = _one(args, out)
+    out.give({"model": str(model), **content, "written": out.written})
     return 0
 
 
-def _run_each(args: argparse.Namespace) -> int:
+def _run_each(args: IdentifyArguments, out: Output) -> int:
     """Fit every file as a test of its own: one that fails, or Ctrl-C, leaves the finished ones as they are."""
-    out, failures, interrupt = Output(args), Failures(args), Interrupt()
+    failures, interrupt = Failures(args), Interrupt()
     fits: dict[str, Fit] = {}
-    contents, written, total = [], [], len(args.files)
+    contents, total = [], len(args.files)
     with waiting("tests") as count, interrupt.kept_back(fits):
         for done, (path, stem) in enumerate(zip(args.files, _stems(args.files), strict=True)):
             count(done, total)
             with failures.noted(str(path)):
-                fits[stem], content, paths = _one(_for_one(args, path, stem), out)
+                fits[stem], content = _one(_for_one(args, path, stem), out)
                 contents.append(content)
-                written += paths
             with waiting(f"intervals of {path.name}"):
                 result = _summary(fits[stem]) if stem in fits else "failed"
             out.say(f"{stem} ({done + 1} of {total}): {result}")
@@ -80,29 +74,13 @@ def _run_each(args: argparse.Namespace) -> int:
         out.say(*_table(fits), *(f"warning: {text}" for text in found))
         out.warn(*found)
         if args.out is not None:
-            path = args.out / "parameters.csv"
-            write_file(path, _csv(fits))
-            written.append(path)
-    out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
-    content = {"tests": contents, "failed": failures.found, "written": [str(path) for path in written]}
+            out.written.append(args.out / "parameters.csv")
+            write_file(out.written[-1], _csv(fits))
+    content = {"tests": contents, "failed": failures.found, "written": out.written}
     out.give({"model": str(args.model), **content})
     failures.complain()
     interrupt.resume()
     return 1 if failures.found else 0
-
-
-def _check_options(args: argparse.Namespace) -> None:
-    given = [name for name, attribute in _OF_THE_JOINT if getattr(args, attribute) is not None]
-    given += ["--method"] if args.method != ["compliance"] else []
-    given += ["--damping"] if args.damping != "auto" else []
-    given += ["--cross"] if args.cross != "zero" else []
-    if given:
-        verb, pronoun = ("is", "it") if len(given) == 1 else ("are", "them")
-        raise UsageError(
-            f"{listed(given)} {verb} for fits without models; leave {pronoun} out, since {args.model} defines the joint"
-        )
-    if args.each and args.export is not None and args.output is None:
-        raise UsageError("--export of several tests needs files; add --output")
 
 
 def _stems(files: Sequence[Path]) -> list[str]:
@@ -115,84 +93,66 @@ def _stems(files: Sequence[Path]) -> list[str]:
     return stems
 
 
-def _for_one(args: argparse.Namespace, path: Path, stem: str) -> argparse.Namespace:
+def _for_one(args: IdentifyArguments, path: Path, stem: str) -> IdentifyArguments:
     """Return the options for one test: its file, and names of what is written."""
-    own = argparse.Namespace(**vars(args))
-    own.files = [path]
-    for name in ("save", "report", "output"):
-        target = getattr(args, name)
-        setattr(own, name, None if target is None else target.with_name(f"{target.stem}_{stem}{target.suffix}"))
-    own.out = None if args.out is None else args.out / stem
-    return own
+
+    def own(target: Path | None) -> Path | None:
+        return None if target is None else target.with_name(f"{target.stem}_{stem}{target.suffix}")
+
+    folder = None if args.out is None else args.out / stem
+    return replace(
+        args, files=[path], save=own(args.save), report=own(args.report), output=own(args.output), out=folder
+    )
 
 
-def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], list[Path]]:
-    """Fit one test, write what is wanted; return the fit, its content for JSON, and what was written."""
-    with waiting(f"reading {file_names(args)}"):
+def _one(args: IdentifyArguments, out: Output) -> tuple[Fit, dict[str, Any]]:
+    """Fit one test and write what is wanted; return the fit and its content for JSON."""
+    model = args.model
+    assert model is not None
+    with waiting(f"reading {args.source}"):
         raw, frfs = _read(args)
         wrong = wrong_numbers(raw)
-        stop_at_errors([] if wrong is None else [wrong], args.accept or ())
-        measured = measured_assembly(args.model, frfs, bands=args.band)
-        measured = replace(measured, setups=setups_with_gains(args, measured.setups, measured.h.shape))
-    request = _request(args, measured)
+        stop_at_errors([] if wrong is None else [wrong], args.accept)
+        measured = measured_assembly(model, frfs, bands=args.band)
+        setups = setups_with_gains(args, args.source, measured.setups, measured.h.shape)
+        measured = replace(measured, setups=setups)
+    is_one = "" in measured.assembly.joints
+    if args.export is not None and args.faces is None and is_one:
+        args = replace(args, faces=_rigid_faces(measured))
+    request = card_request(args, measured.assembly.joint.dofs, damping="none", cross="zero",
+                           points=_joint_places(measured) if is_one else None)  # fmt: skip
     if not args.each:
-        out.say(*_heading(args, measured))
-    with waiting(f"fit of {file_names(args)}"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        warnings.simplefilter("ignore", FrfCheckWarning)
+        size = f"{len(measured.responses)} responses x {len(measured.forces)} forces"
+        out.say(f"{args.source}: {size}; {model.name}", *measured.describe())
+    with waiting(f"fit of {args.source}"), without_warnings_of_fits():
         fit = measured.fit(noise=stated_noise(args), sensor_mass=args.sensor_mass,
-                           find_wrong_channels=args.find_wrong_channels, accept=args.accept or ())  # fmt: skip
-    source, written, text = file_names(args), list[Path](), ""
+                           find_wrong_channels=args.find_wrong_channels, accept=args.accept)  # fmt: skip
     if not args.each:
         out.say("", fit)
         with waiting("what to measure next"):
             following = next_sentences(fit)
         out.say(*([""] if following else []), *following)
         out.warn(*fit.warnings)
-    if request is not None:
-        text = written_cards(fit, request, [f"from {source}", *_place_of_joint(measured, request)])
-        if args.output is None:
-            out.say("", text.rstrip("\n"))
-        else:
-            written.append(args.output)
-    if args.save is not None:
-        write_record(args.save, fit_to_dict(fit, lines=args.save_lines) | {"source": source})
-        written.append(args.save)
-    if args.report is not None:
-        args.report.parent.mkdir(parents=True, exist_ok=True)
-        written.append(write_report(fit, args.report, source=source, command=args.typed, nodes=page_nodes(args),
-                                    parts=measured.sketched))  # fmt: skip
-    if args.out is not None:
-        from jointfrf.workbench.report.fit import write_fit
-
-        written += write_fit([fit], args.out, source)
+    places = [] if request is None else _place_of_joint(measured, request)
+    parts = measured.sketched if args.report is not None else ()
+    text = write_results(args, [fit], out, request, places, parts=parts)
     content = {
-        "sources": [str(path) for path in args.files],
+        "sources": args.files,
         "channels": {"responses": measured.channels[0], "forces": measured.channels[1], "unused": measured.unused},
         "fits": [fit_to_dict(fit, lines=False)] if args.json else [],
-        "cards": text or None,
+        "cards": text,
     }
-    return fit, content, written
+    return fit, content
 
 
-def _read(args: argparse.Namespace) -> tuple[FrfSet, FrfSet]:
+def _read(args: IdentifyArguments) -> tuple[FrfSet, FrfSet]:
     """Return the FRFs of the files of one test, and their receptances."""
     try:
-        raw = read_measured(args)
+        raw = read_frfs(*args.files, **args.reading())
         return raw, raw.receptance()
     except FileContentError as error:
         hint = "; use --each if every file is a test of its own" if len(args.files) > 1 else ""
         raise FileContentError(f"{error}{hint}") from error
-
-
-def _request(args: argparse.Namespace, measured: MeasuredAssembly) -> CardRequest | None:
-    joint = measured.assembly.joint
-    is_one = "" in measured.assembly.joints
-    if args.export is not None and args.faces is None and is_one:
-        args.faces = _rigid_faces(measured)
-    return card_request(args, joint.dofs, damping="none", cross="zero",
-                        points=_joint_places(measured) if is_one else None)  # fmt: skip
 
 
 def _rigid_faces(measured: MeasuredAssembly) -> tuple[list[int], list[int]] | None:
@@ -230,12 +190,6 @@ def _place_of_joint(measured: MeasuredAssembly, request: CardRequest) -> list[st
     words = [", ".join(f"{x:.6g}" for x in at / own.length + 0.0) for at in places]
     j, k = request.nodes
     return [*said, f"node {j} lies at ({words[0]}), node {k} at ({words[1]}) {own.words.partition(',')[0]}"]
-
-
-def _heading(args: argparse.Namespace, measured: MeasuredAssembly) -> Iterator[str]:
-    """Say what is identified from what."""
-    yield f"{file_names(args)}: {len(measured.responses)} responses x {len(measured.forces)} forces; {args.model.name}"
-    yield from measured.describe()
 
 
 def _rows(fit: Fit) -> Iterator[tuple[str, str, float, float, float, float]]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from jointfrf.identification.joint_file import read_joint_file
@@ -11,6 +11,7 @@ from jointfrf.joint import Joint
 from jointfrf.laws.joint_toml import read_joint_table, start_values
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.toml.table import TomlTable
+from jointfrf.workbench.cli.arguments.identify import IdentifyArguments
 from jointfrf.workbench.cli.usage import UsageError
 
 __all__ = ["joint_of_laws"]
@@ -21,7 +22,7 @@ _SPRINGS = {
 }  # fmt: skip
 
 
-def joint_of_laws(args: argparse.Namespace, dofs: Sequence[str]) -> LawJoint | None:
+def joint_of_laws(args: IdentifyArguments, dofs: Sequence[str]) -> LawJoint | None:
     """Return the joint of laws that the options name, with its DOFs in this order; None where they name none.
 
     Raises
@@ -37,7 +38,9 @@ def joint_of_laws(args: argparse.Namespace, dofs: Sequence[str]) -> LawJoint | N
         raise UsageError(f"--cross {args.cross} is for springs; give cross terms of laws in the file of --joint")
     if args.method != ["compliance"]:
         raise UsageError("laws need method compliance; leave out --method")
-    joint = _of_words(args.law, args.damping) if args.joint is None else _of_file(args)
+    if args.joint is not None and args.damping != "auto":
+        raise UsageError("--damping is for springs, and --joint gives the laws; leave out --damping")
+    joint = _of_file(args.joint) if args.joint is not None else _of_words(args.law or (), args.damping)
     if args.export is not None and any(law.constant_terms is None for law in joint.laws.values()):
         raise UsageError("--export takes no frequency-dependent law; use --save, then jointfrf export --frequency HZ")
     if not joint.laws:
@@ -48,10 +51,8 @@ def joint_of_laws(args: argparse.Namespace, dofs: Sequence[str]) -> LawJoint | N
     return joint
 
 
-def _of_file(args: argparse.Namespace) -> LawJoint:
-    if args.damping != "auto":
-        raise UsageError("--damping is for springs, and --joint gives the laws; leave out --damping")
-    joint = read_joint_file(args.joint).joint
+def _of_file(path: Path) -> LawJoint:
+    joint = read_joint_file(path).joint
     return LawJoint.of_joint(joint) if isinstance(joint, Joint) else joint
 
 

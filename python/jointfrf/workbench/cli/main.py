@@ -17,7 +17,8 @@ from typing import Any, TextIO, cast
 from jointfrf.spelling import did_you_mean
 from jointfrf.workbench.cli.configuration import with_configuration
 from jointfrf.workbench.cli.parser import COMMANDS, command_parser, top_parser
-from jointfrf.workbench.cli.usage import EXPECTED, UsageError, complain, sentence, shown_progress, shown_warnings
+from jointfrf.workbench.cli.progress import shown_progress
+from jointfrf.workbench.cli.usage import EXPECTED, UsageError, complain, sentence, shown_warnings
 
 __all__ = ["main"]
 
@@ -31,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        Words after `jointfrf`; those of the process by default.
+        Words after `jointfrf`; the words of the process by default.
 
     Returns
     -------
@@ -70,12 +71,13 @@ def _run(words: list[str], stop_if_interrupted: Callable[[], None]) -> int:
         hint = did_you_mean(name, COMMANDS) or "; see jointfrf --help"
         raise UsageError(f"unknown command {name!r}{hint}")
     parser = command_parser(name)
-    args = parser.parse_words(words[1:])
-    args.typed = shlex.join(["jointfrf", *words])
-    args.warned = []
-    args.stop_if_interrupted = stop_if_interrupted
-    with shown_warnings(args.warned), _limited(args.limit_gb):
-        parser.check_required(with_configuration(args, parser, name))
+    found = parser.parse_words(words[1:])
+    typed, warned = shlex.join(["jointfrf", *words]), list[str]()
+    with shown_warnings(warned), _limited(found.limit_gb):
+        args = parser.arguments_of(
+            with_configuration(found, parser, name), typed=typed, warned=warned, stop_if_interrupted=stop_if_interrupted
+        )
+        args.check_files()
         command = import_module(f"jointfrf.workbench.cli.{name}")
         stop_if_interrupted()
         with nullcontext() if args.quiet else shown_progress(name):

@@ -1,8 +1,7 @@
-"""Masses on the command line: what the FRFs say of them, and what the user states."""
+"""Masses that the FRFs show, compared with masses that the user states."""
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -16,28 +15,32 @@ from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.models.model import Model
 from jointfrf.workbench.assembly_file.side_part import SidePart
+from jointfrf.workbench.cli.arguments.measured_file import MassArguments
 from jointfrf.workbench.cli.measured_file import in_some_band
 from jointfrf.workbench.cli.measured_joint import MeasuredJoint
 from jointfrf.workbench.cli.usage import UsageError
 
 __all__ = ["check_masses", "check_stated", "scale_of_fit", "scale_of_joint"]
 
-#: Options of stated masses, and the sides that they are of.
-_OPTIONS = {"mass_j": "j", "mass_k": "k", "mass": "j and k"}
 #: Lines of a look: those on the mass line are the lowest.
 _LINES = 1000
 
 
-def check_stated(args: argparse.Namespace) -> None:
+def check_stated(args: MassArguments) -> None:
     """Raise an error for a mass that is none."""
-    for name in _OPTIONS:
-        value = getattr(args, name)
-        if value is not None and not 0 < value < np.inf:
-            raise UsageError(f"--{name.replace('_', '-')} must be positive, not {value:g}; state it in kg")
+    for name, _, value in _stated(args):
+        if not 0 < value < np.inf:
+            raise UsageError(f"{name} must be positive, not {value:g}; state it in kg")
+
+
+def _stated(args: MassArguments) -> list[tuple[str, str, float]]:
+    """Return the options of stated masses, the sides that they are of, and their values in kg."""
+    options = (("--mass-j", "j", args.mass_j), ("--mass-k", "k", args.mass_k), ("--mass", "j and k", args.mass))
+    return [(name, side, value) for name, side, value in options if value is not None]
 
 
 def scale_of_fit(fit: Fit) -> ApparentScale:
-    """Return what the FRFs of a fit at the joint say of masses; nothing for other fits."""
+    """Return the masses that the FRFs of a fit at the joint show; nothing for other fits."""
     data = fit.data
     if not isinstance(data, FitData):
         return ApparentScale()
@@ -46,7 +49,7 @@ def scale_of_fit(fit: Fit) -> ApparentScale:
 
 
 def scale_of_joint(joint: MeasuredJoint) -> ApparentScale:
-    """Return what the FRFs of a joint say of masses, without a fit; nothing where some are missing."""
+    """Return the masses that the FRFs of a joint show, without a fit; nothing if some FRFs are missing."""
     freq, h = in_some_band(joint.freq_hz, joint.h, joint.bands)
     freq, h = freq[:_LINES], np.ascontiguousarray(h[:_LINES])
     if not np.isfinite(h).all():
@@ -70,7 +73,7 @@ def _scale(
     return apparent_scale(freq[used], gamma, spread, dofs)
 
 
-def check_masses(args: argparse.Namespace, scale: ApparentScale, sides: Sequence[SidePart] = ()) -> list[str]:
+def check_masses(args: MassArguments, scale: ApparentScale, sides: Sequence[SidePart] = ()) -> list[str]:
     """Raise an error for a mass, stated by an option or by the model of a side, that the FRFs contradict.
 
     Returns
@@ -82,17 +85,18 @@ def check_masses(args: argparse.Namespace, scale: ApparentScale, sides: Sequence
     ------
     FileContentError
     """
-    stated = [(f"--{name.replace('_', '-')}", side, getattr(args, name)) for name, side in _OPTIONS.items()]
+    stated = _stated(args)
+    unknown = [
+        f"{name} was not compared: the lowest lines do not show this mass to {100 * KNOWN:g} %"
+        for name, side, _ in stated
+        if scale.of_side(side) is None
+    ]
     for name, side, part in zip(("--side-j", "--side-k"), "jk", sides, strict=False):
         own, seen = part.model.part, scale.of_side(side)
-        if seen is not None and isinstance(own.source, Model):
-            stated.append((name, side, model_mass(own.source, seen.direction)))
+        mass = model_mass(own.source, seen.direction) if seen is not None and isinstance(own.source, Model) else None
+        stated += [] if mass is None else [(name, side, mass)]
     for name, side, value in stated:
-        wrong = None if value is None else scale.contradiction(side, value)
+        wrong = scale.contradiction(side, value)
         if wrong is not None:
             raise FileContentError(f"{wrong}: correct the unit of the FRFs, or {name}")
-    return [
-        f"--{name.replace('_', '-')} was not compared: the lowest lines do not show this mass to {100 * KNOWN:g} %"
-        for name, side in _OPTIONS.items()
-        if getattr(args, name) is not None and scale.of_side(side) is None
-    ]
+    return unknown

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 
 from jointfrf.channels.check.result import FrfCheck
 from jointfrf.channels.joint_channels import (
+    ChannelAgreement,
     JointChannels,
     LeftOutDof,
     OffsetCoupling,
@@ -24,16 +25,17 @@ from jointfrf.channels.joint_channels import (
 from jointfrf.channels.point_lines import Interface, interface
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import FileContentError
-from jointfrf.frf.frf_set import Channel, ChannelPlace, JointSide, places_of_nodes
+from jointfrf.frf.frf_set import ChannelPlace, JointSide, places_of_nodes
 from jointfrf.io import FrfSet, read_channel_table
 from jointfrf.io.channel_table import places_of_table
 from jointfrf.io.units import StatedUnits
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.toml.table import read_toml
 from jointfrf.workbench.assembly_file.side_part import PlacedChannel
-from jointfrf.workbench.cli.arguments.measured_file import Nodes, shown_nodes
-from jointfrf.workbench.cli.measured_file import file_names, in_some_band
-from jointfrf.workbench.cli.usage import UsageError, listed
+from jointfrf.workbench.cli.arguments.measured_file import JointArguments, PointArguments
+from jointfrf.workbench.cli.arguments.words import Nodes, shown_nodes
+from jointfrf.workbench.cli.measured_file import in_some_band
+from jointfrf.workbench.cli.usage import UsageError, check_both, listed
 
 __all__ = ["MeasuredJoint", "measured_joint"]
 
@@ -89,13 +91,6 @@ class MeasuredJoint:
             found.append(named)
         return found
 
-    @property
-    def transform(self) -> Interface | tuple[Interface, Interface] | None:
-        """What `identify` takes."""
-        if self.is_of_points:
-            return None
-        return self.responses if self.responses is self.forces else (self.responses, self.forces)
-
     def known(self, frfs: FrfSet, *, is_noise_stated: bool) -> dict[str, Any]:
         """Return what `identify` takes of the channels: to the joint DOFs, set-ups, coherence where the file has it.
 
@@ -104,7 +99,9 @@ class MeasuredJoint:
         names = self.responses.channels, self.forces.channels
         coherence = None if is_noise_stated else frfs.coherence_matrix(*names)
         shared = {} if coherence is None else {"coherence": coherence, "averages": frfs.least_averages(*names)}
-        return {"transform": self.transform, "setups": frfs.setups_between(*names), **shared}
+        one_or_both = self.responses if self.is_square else (self.responses, self.forces)
+        transform = None if self.is_of_points else one_or_both
+        return {"transform": transform, "setups": frfs.setups_between(*names), **shared}
 
     @property
     def dofs(self) -> tuple[str, ...]:
@@ -122,7 +119,7 @@ class MeasuredJoint:
 
     @cached_property
     def agreement(self) -> tuple[SideAgreement, ...]:
-        """What each channel has to do with motion that is not rigid; empty without virtual points."""
+        """Share of each channel in motion that is not rigid; empty without virtual points."""
         return () if self.channels is None else self.channels.agreement(self._lines)
 
     @cached_property
@@ -159,14 +156,14 @@ class MeasuredJoint:
         return () if self.is_of_points else offset_couplings(self.responses)
 
     def warnings(self, check: FrfCheck) -> Iterator[str]:
-        """Say what a reader must know before the fit, beside what a look at the FRFs has found."""
+        """Return warnings before the fit, in addition to the findings of the data check."""
         if any(finding.code == "coordinates-unit" and finding.severity == "error" for finding in check.findings):
             return
         yield from (str(one) for one in self._without(check).left_out)
         yield from (f"{one}; --at X,Y,Z gives both sides one" for one in self.offsets if one.is_left_out)
 
     def text(self) -> Iterator[str]:
-        """Describe reference points, and channels beside rigid motion, line by line."""
+        """Describe reference points, and channels compared with rigid motion, line by line."""
         one, other = self.responses.references
         if self.channels is not None and np.array_equal(one, other):
             yield f"virtual points at x, y, z = {_millimetres(one)} mm on both sides"
@@ -182,7 +179,7 @@ class MeasuredJoint:
             yield from ("", *_agreement_table(self.agreement))
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything said here, for JSON."""
+        """Return the joint and its channels, for JSON."""
         return {
             "nodes": {"j": self.nodes[0], "k": self.nodes[1]},
             "dofs": self.dofs,
@@ -215,6 +212,13 @@ def _not_rigid(group: SideAgreement) -> float:
     return float(np.sqrt(max(1 - group.rigid**2, 0)))
 
 
+def _agreement_cell(one: ChannelAgreement | None) -> str:
+    if one is None:
+        return " " * 32
+    blame = "  ?" if np.isnan(one.blame) else f"{100 * one.blame:.0f} %"
+    return f"{one.channel!s:<12}{one.consistency:>12.3f}{blame:>8}"
+
+
 def _agreement_table(groups: tuple[SideAgreement, ...]) -> Iterator[str]:
     """Write the channels of each side beside one another: consistency and blame."""
     for kind in ("response", "excitation"):
@@ -226,24 +230,15 @@ def _agreement_table(groups: tuple[SideAgreement, ...]) -> Iterator[str]:
             )
         heading = f"  {'channel':<12}{'consistency':>12}{'blame':>8}"
         yield f"{heading}    {heading.strip()}"
-        rows = max(len(j.channels), len(k.channels))
-        for i in range(rows):
-            cells = []
-            for group in (j, k):
-                if i >= len(group.channels):
-                    cells.append(" " * 32)
-                    continue
-                one = group.channels[i]
-                blame = "  ?" if np.isnan(one.blame) else f"{100 * one.blame:.0f} %"
-                cells.append(f"{one.channel!s:<12}{one.consistency:>12.3f}{blame:>8}")
-            yield ("  " + "    ".join(cells)).rstrip()
+        for pair in zip_longest(j.channels, k.channels):
+            yield f"  {'    '.join(map(_agreement_cell, pair))}".rstrip()
         yield ""
     yield "consistency: 1 where a channel moves as the others say"
     yield "blame: share of what is not rigid on its side that is gone without it"
 
 
 def measured_joint(
-    args: argparse.Namespace, frfs: FrfSet, bending_stiffness: float | None = None, *, is_look: bool = False
+    args: JointArguments, frfs: FrfSet, bending_stiffness: float | None = None, *, is_look: bool = False
 ) -> MeasuredJoint:
     """Find the channels of a joint and the way to its DOFs; for a look at them FRFs may be missing.
 
@@ -255,51 +250,50 @@ def measured_joint(
         Words and files do not fit each other.
     """
     table = _table(args)
-    _check_options(args, frfs, table)
     known = {channel.node for channel in (*frfs.responses, *frfs.excitations)}
+    points = args.points if isinstance(args, PointArguments) else None
+    dofs = _checked_dofs(args, points, known, table)
     if table is not None:
         places = _on_sides(table, args, known, frfs.source)
         nodes = _nodes_of(places, "j"), _nodes_of(places, "k")
     else:
-        nodes = args.j.among(known, frfs.source), args.k.among(known, frfs.source)
-        places = ()
+        assert args.j is not None and args.k is not None  # noqa: PT018
+        nodes, places = (args.j.among(known, frfs.source), args.k.among(known, frfs.source)), ()
     if args.at is not None:
         places = places or places_of_nodes(frfs, *nodes)
-        every = joint_channels_of_all(frfs, places, args.at, args.dofs, at_k=args.at_k)
-        names = every.responses.channels, every.forces.channels
-        whole = every, frfs.matrix(*names, allow_missing=True)
-        found, _ = every.without_missing(frfs.measured_between(*names))
+        every = joint_channels_of_all(frfs, places, args.at, dofs, at_k=args.at_k)
+        whole = every, frfs.matrix(every.responses.channels, every.forces.channels, allow_missing=True)
+        found, _ = every.without_missing(frfs.measured_between(every.responses.channels, every.forces.channels))
         return MeasuredJoint(
             frfs.freq_hz, found.gamma(frfs), found.responses, found.forces, found, nodes, args.band, whole
         )
-    of_points = args.points is not None
     sides = (
-        _points(args, nodes)
-        if of_points
-        else _node_dofs(args, frfs, nodes) or _point_lines(args, frfs, nodes, bending_stiffness)
+        _points(points, nodes, dofs)
+        if points is not None
+        else _node_dofs(dofs, frfs, nodes) or _point_lines(args, frfs, nodes, dofs, bending_stiffness)
     )
     h = frfs.matrix(sides.channels, sides.channels, allow_missing=is_look)
-    return MeasuredJoint(frfs.freq_hz, h, sides, sides, None, nodes, args.band, is_of_points=of_points)
+    return MeasuredJoint(frfs.freq_hz, h, sides, sides, None, nodes, args.band, is_of_points=points is not None)
 
 
-def _points(args: argparse.Namespace, nodes: tuple[list[int], list[int]]) -> Interface:
+def _points(points: list[str], nodes: tuple[list[int], list[int]], dofs: list[str]) -> Interface:
     """Return the DOFs of several joint points, one node on each side for each."""
-    if not len(args.points) == len(nodes[0]) == len(nodes[1]):
+    if not len(points) == len(nodes[0]) == len(nodes[1]):
         raise UsageError(
-            f"--points names {len(args.points)}, --j {len(nodes[0])} and --k {len(nodes[1])}; give one node on each "
+            f"--points names {len(points)}, --j {len(nodes[0])} and --k {len(nodes[1])}; give one node on each "
             "side for each joint point"
         )
-    if len(set(args.points)) != len(args.points):
+    if len(set(points)) != len(points):
         raise UsageError("--points names a joint point twice; give different names")
-    pairs = [node_dofs(j, k, args.dofs, {}) for j, k in zip(*nodes, strict=True)]
-    n = len(args.dofs)
+    pairs = [node_dofs(j, k, dofs, {}) for j, k in zip(*nodes, strict=True)]
+    n = len(dofs)
     channels = [channel for side in range(2) for one in pairs for channel in one.channels[side * n : (side + 1) * n]]
-    dofs = tuple(f"{name}.{dof}" for name, one in zip(args.points, pairs, strict=True) for dof in one.dofs)
+    names = tuple(f"{name}.{dof}" for name, one in zip(points, pairs, strict=True) for dof in one.dofs)
     ends = np.zeros(3), np.zeros(3)
-    return Interface(tuple(channels), np.eye(len(channels)), ends, dofs, np.zeros((len(channels), 12)), placed=False)
+    return Interface(tuple(channels), np.eye(len(channels)), ends, names, np.zeros((len(channels), 12)), placed=False)
 
 
-def _table(args: argparse.Namespace) -> tuple[ChannelPlace, ...] | None:
+def _table(args: JointArguments) -> tuple[ChannelPlace, ...] | None:
     """Read the table of channels: the one that is named, or that of the project."""
     if args.channels is not None:
         is_pair = "#" in args.channels.name and "," in args.channels.name  # two sheets of pyFBS, which have no unit
@@ -311,22 +305,20 @@ def _table(args: argparse.Namespace) -> tuple[ChannelPlace, ...] | None:
     return places_of_table(table) if "channel" in table.content else None
 
 
-def _check_options(args: argparse.Namespace, frfs: FrfSet, table: object) -> None:
-    known = shown_nodes({channel.node for channel in (*frfs.responses, *frfs.excitations)})
+def _checked_dofs(args: JointArguments, points: list[str] | None, known: set[int], table: object) -> list[str]:
+    """Return the DOFs of the joint; raise an error for options that are missing or contradict each other."""
     needs = {
-        "--j": (args.j, "the nodes on side j of the joint, such as --j 101,102"),
-        "--k": (args.k, "the nodes on side k of the joint, such as --k 201,202"),
+        "--j": (args.j or table, "the nodes on side j of the joint, such as --j 101,102"),
+        "--k": (args.k or table, "the nodes on side k of the joint, such as --k 201,202"),
         "--dofs": (args.dofs, "the DOFs of the joint, such as --dofs y,rz"),
     }
     missing = [name for name, (value, _) in needs.items() if value is None]
-    if table is not None:
-        missing = [name for name in missing if name == "--dofs"]
     if missing:
         what = "; ".join(needs[name][1] for name in missing)
         verb = "is" if len(missing) == 1 else "are"
-        nodes = "" if missing == ["--dofs"] else f" ({file_names(args)} has nodes {known})"
+        nodes = "" if missing == ["--dofs"] else f" ({args.source} has nodes {shown_nodes(known)})"
         raise UsageError(f"{listed(missing)} {verb} missing: {what}{nodes}")
-    if args.points is not None:
+    if points is not None:
         for name, value in (("--at", args.at), ("--spacing", args.spacing), ("a table of channels", table)):
             if value is not None:
                 raise UsageError(f"--points takes the nodes as joint points; leave out {name}")
@@ -334,16 +326,16 @@ def _check_options(args: argparse.Namespace, frfs: FrfSet, table: object) -> Non
         for name, value in (("--at-k", args.at_k), ("a table of channels", table)):
             if value is not None:
                 raise UsageError(f"{name} needs a reference point of the joint; add --at X,Y,Z")
-    if (args.spacing is None) != (args.axis is None):
-        raise UsageError("only one of --spacing and --axis is given; give both")
+    check_both(args, "spacing", "axis")
     if args.spacing is not None and args.at is not None:
         raise UsageError("--spacing is for nodes along a line, --at for virtual points; leave out one")
     if args.spacing is not None and not args.spacing > 0:
         raise UsageError(f"--spacing is {args.spacing:g}; give a positive number")
+    return args.dofs or []
 
 
 def _on_sides(
-    table: tuple[ChannelPlace, ...], args: argparse.Namespace, known: set[int], source: str
+    table: tuple[ChannelPlace, ...], args: JointArguments, known: set[int], source: str
 ) -> tuple[ChannelPlace, ...]:
     """Return the channels of a table that belong to the joint, each with its side."""
     if args.j is None and args.k is None:
@@ -364,43 +356,42 @@ def _nodes_of(places: tuple[ChannelPlace, ...], side: str) -> list[int]:
     return list(dict.fromkeys(place.channel.node for place in places if place.side == side))
 
 
-def _node_dofs(args: argparse.Namespace, frfs: FrfSet, nodes: tuple[list[int], list[int]]) -> Interface | None:
+def _node_dofs(dofs: list[str], frfs: FrfSet, nodes: tuple[list[int], list[int]]) -> Interface | None:
     """Return the DOFs of two nodes whose rotations are in the file, too."""
-    rotations = [dof for dof in args.dofs if is_rotation(dof)]
-    if len(nodes[0]) != 1 or len(nodes[1]) != 1 or not rotations:
+    if len(nodes[0]) != 1 or len(nodes[1]) != 1 or not any(map(is_rotation, dofs)):
         return None
-    found = node_dofs(nodes[0][0], nodes[1][0], args.dofs, frfs.coordinates)
+    found = node_dofs(nodes[0][0], nodes[1][0], dofs, frfs.coordinates)
+    there = {*frfs.responses, *frfs.excitations}
     turning = [channel for channel in found.channels if channel.is_rotation]
-    return found if all(_is_there(channel, frfs) for channel in turning) else None
-
-
-def _is_there(channel: Channel, frfs: FrfSet) -> bool:
-    return any(each in (*frfs.responses, *frfs.excitations) for each in (channel, channel.opposite()))
+    return found if all(there & {channel, channel.opposite()} for channel in turning) else None
 
 
 def _point_lines(
-    args: argparse.Namespace, frfs: FrfSet, nodes: tuple[list[int], list[int]], bending_stiffness: float | None
+    args: JointArguments,
+    frfs: FrfSet,
+    nodes: tuple[list[int], list[int]],
+    dofs: list[str],
+    bending_stiffness: float | None,
 ) -> Interface:
     """Return the DOFs of points along lines; E I of the sides in N m^2 widens intervals of rotations."""
     places = dict(frfs.coordinates)
     if args.spacing is not None:
         for own in nodes:
             for i, node in enumerate(own):
-                places[node] = np.zeros(3)
-                places[node]["xyz".index(args.axis)] = args.spacing * i
+                places[node] = args.spacing * i * np.eye(3)["xyz".index(args.axis or "x")]
     if len(nodes[0]) != len(nodes[1]):
         raise UsageError(
             f"--j and --k name {len(nodes[0])} and {len(nodes[1])} nodes; give equal numbers, or use virtual points by "
             "--at X,Y,Z"
         )
     for node in (*nodes[0], *nodes[1]):
-        if node not in places and (len(nodes[0]) > 1 or any(is_rotation(dof) for dof in args.dofs)):
+        if node not in places and (len(nodes[0]) > 1 or any(is_rotation(dof) for dof in dofs)):
             raise FileContentError(
                 f"{frfs.source} has no coordinates of node {node}; add --spacing and --axis, or --at and --channels"
             )
     at = {node: places.get(node, np.zeros(3)) for node in (*nodes[0], *nodes[1])}
     try:
-        return interface(*nodes, args.dofs, at, bending_stiffness=bending_stiffness, highest_hz=frfs.freq_hz[-1])
+        return interface(*nodes, dofs, at, bending_stiffness=bending_stiffness, highest_hz=frfs.freq_hz[-1])
     except ValueError as error:
         if args.spacing is not None or any(node not in frfs.coordinates for node in at):
             raise

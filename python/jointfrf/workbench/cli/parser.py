@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import math
 import re
 import sys
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from jointfrf.spelling import did_you_mean, visible
+from jointfrf.workbench.cli.arguments.declaration import Arguments, DeclaredArgument, declared
 from jointfrf.workbench.cli.usage import UsageError, listed
 
-__all__ = ["COMMANDS", "CommandParser", "command_parser", "one_of", "top_parser", "with_value"]
+__all__ = ["COMMANDS", "CommandParser", "command_parser", "top_parser", "with_value"]
 
 #: The commands, each the module of its name, and what they do.
 COMMANDS = {
@@ -43,99 +43,58 @@ _NEGATIVE = re.compile(r"-\.?\d")
 
 
 class CommandParser(argparse.ArgumentParser):
-    """A parser whose errors suggest what was meant; options are written in full.
+    """A parser whose errors suggest a known word; options are written in full.
 
     Attributes
     ----------
     arguments : list of argparse.Action
         All that were added, in their order.
-    repeated : set of str
-        Destinations of options that may be given several times.
-    ways : list of tuple of str
-        The ways to call the command: the options that each one requires.
-    examples : list of str
-        Command lines that run where the files they name are.
+    kind : type
+        The class that declares them.
     """
 
     def __init__(self, **options: Any) -> None:
         self.arguments: list[argparse.Action] = []
-        self.repeated: set[str] = set()
-        self.ways: list[tuple[str, ...]] = []
-        self.examples: list[str] = []
+        self.kind: type[Arguments] = Arguments
         super().__init__(allow_abbrev=False, **options)
-        self._add: Callable[..., argparse.Action] = super().add_argument
 
     def add_argument(self, *names: str, **options: Any) -> argparse.Action:
         """Add an argument as argparse does."""
         self.arguments.append(super().add_argument(*names, **options))
         return self.arguments[-1]
 
-    def heading(self, title: str) -> None:
-        """Put the options that follow under a heading of the help."""
-        self._add = self.add_argument_group(title).add_argument
-
-    def option(
-        self,
-        name: str,
-        what: str,
-        kind: Callable[[str], Any] | Collection[str] | None = None,
-        default: Any = None,
-        *,
-        repeated: bool = False,
-        otherwise: str = "",
-    ) -> None:
-        """Add an option.
-
-        Parameters
-        ----------
-        name : str
-            Such as ``"--noise LEVEL"``; without a value, ``"--json"``, it is a flag.
-        what : str
-            Its help, without the default, which is appended.
-        kind : callable or tuple of str
-            What makes a value of a word; or the words there are.
-        default : optional
-            Value without the option.
-        repeated : bool
-            Whether it may be given several times: its value is then a list.
-        otherwise : str
-            The default in words, if it is no value: ``"all cores"``.
-        """
-        word, _, metavar = name.partition(" ")
-        options: dict[str, Any] = {"help": what + _default(otherwise or default), "default": default}
-        if isinstance(kind, Collection):
-            options |= {"choices": kind, "type": one_of(kind)}
-        elif metavar:
-            options |= {"metavar": metavar, "type": kind}
-        else:
-            options |= {"action": "store_true", "default": False}
-        if repeated:
-            options["action"] = "append"
-        self.arguments.append(self._add(word, **options))
-        self.repeated |= {self.arguments[-1].dest} if repeated else set()
+    def declare(self, kind: type[Arguments]) -> None:
+        """Add the arguments that a class declares, each group of options under its heading."""
+        self.kind, self.description = kind, kind.description
+        add, heading = super().add_argument, ""
+        for one in declared(kind):
+            if one.heading != heading and not one.is_positional:
+                heading, add = one.heading, self.add_argument_group(one.heading).add_argument
+            self.arguments.append(add(*([] if one.is_positional else [one.flag]), **_for_argparse(one)))
+        ways = [f"{self._call(names)} [options]" for names in kind.ways or [()]]
+        self.usage = kind.usage or "\n       ".join(ways).replace("%", "%%")
 
     @property
     def options(self) -> dict[str, argparse.Action]:
         """The options by each of their names."""
         return {name: action for action in self.arguments for name in action.option_strings}
 
-    def requires(self, *names: str) -> None:
-        """State a way to call the command: the options and positional arguments that it requires."""
-        self.ways.append(names)
-
-    def check_required(self, args: argparse.Namespace) -> None:
-        """Check that the options of the only way to call the command are there, whoever gave them.
+    def arguments_of(self, found: argparse.Namespace, **about: Any) -> Arguments:
+        """Return the values of the command line and the configuration as an instance of the class.
 
         Raises
         ------
         UsageError
-            One is missing.
+            An option is missing that the only way to call the command requires.
         """
-        (names, *others), options = self.ways or [()], self.options
-        missing = [name for name in names if name in options and getattr(args, options[name].dest) is None]
+        (names, *others), options = self.kind.ways or [()], self.options
+        missing = [name for name in names if name in options and getattr(found, options[name].dest) is None]
         if missing and not others:
             verb = "is" if len(missing) == 1 else "are"
             raise UsageError(f"{listed(missing)} {verb} missing: {self._call(names)}")
+        values = {one.name: getattr(found, one.name) for one in declared(self.kind)}
+        values |= {"given": frozenset(found.given), "configuration": found.configuration}
+        return self.kind(**values, **about)
 
     def _call(self, names: Sequence[str]) -> str:
         """Return the command with positional arguments, and some options, each with its value."""
@@ -143,7 +102,7 @@ class CommandParser(argparse.ArgumentParser):
         shown = []
         for action in positional:
             name, is_many = str(action.metavar or action.dest), action.nargs in ("*", "+")
-            if action.nargs in ("*", "?") and not self.ways:
+            if action.nargs in ("*", "?") and not self.kind.ways:
                 shown.append(f"[{name} ...]" if is_many else f"[{name}]")
             elif action.nargs not in ("*", "?") or name in names:
                 shown.append(f"{name} [{name} ...]" if is_many else name)
@@ -151,18 +110,13 @@ class CommandParser(argparse.ArgumentParser):
             [self.prog, *shown, *(with_value(self.options[name]) for name in names if name in self.options)]
         )
 
-    def describe_usage(self) -> None:
-        """Show the ways to call the command in its usage, unless it has one; all other options are in the help."""
-        ways = [f"{self._call(names)} [options]" for names in self.ways or [()]]
-        self.usage = self.usage or "\n       ".join(ways).replace("%", "%%")
-
     def format_help(self) -> str:
         """Return the help, with the examples at its end."""
-        shown = "".join(f"  {example}\n" for example in self.examples)
+        shown = "".join(f"  {example}\n" for example in self.kind.examples)
         return super().format_help() + (f"\nexamples:\n{shown}" if shown else "")
 
     def error(self, message: str) -> NoReturn:
-        """Print the usage of this command and what is wrong."""
+        """Print the usage of this command and the error."""
         self.print_usage(sys.stderr)
         self.exit(2, f"jointfrf: error: {visible(message)}\n")
 
@@ -206,11 +160,11 @@ def _name(word: str) -> str:
 
 def _default(value: Any) -> str:
     """Return what stands for a default at the end of a help text; nothing for one that means no value."""
-    if value is None or value == [] or value is False:
+    if value is None or value is False or value == []:
         return ""
     values = value if isinstance(value, list | tuple) else [value]
     shown = ",".join(f"{one:g}" if isinstance(one, float) else str(one) for one in values)
-    return f" (default: {shown})".replace("%", "%%")
+    return f" (default: {shown})"
 
 
 def with_value(action: argparse.Action) -> str:
@@ -220,54 +174,26 @@ def with_value(action: argparse.Action) -> str:
     return " ".join(word for word in (name, "" if action.nargs == 0 else value) if word)
 
 
-def one_of(known: Collection[str]) -> Callable[[str], str]:
-    """Return a type of words that accepts only known ones."""
-
-    def taken(word: str) -> str:
-        if word not in known:
-            raise argparse.ArgumentTypeError(
-                f"unknown value {word!r}; use one of {', '.join(known)}{did_you_mean(word, known)}"
-            )
-        return word
-
-    return taken
-
-
-def _add_common(parser: CommandParser) -> None:
-    """Describe the options that every command has."""
-    parser.heading("output and defaults")
-    parser.option("--json", "print the result as JSON")
-    parser.option("--quiet", "print only warnings and errors, no progress")
-    parser.option(
-        "--config FILE",
-        "channels and default options of a project",
-        otherwise="jointfrf.toml in the working directory, if it exists",
-    )
-    parser.option("--no-config", "ignore jointfrf.toml")
-    parser.option(
-        "--limit-gb GB",
-        "largest size of one file, and largest memory to read it",
-        _gigabytes,
-        otherwise="16 GB; the larger of 1 GB and 10 times the file",
-    )
-
-
-def _gigabytes(word: str) -> float:
-    try:
-        found = float(word)
-    except ValueError:
-        found = 0.0
-    if not 0 < found < math.inf:
-        raise argparse.ArgumentTypeError(f"{word!r} is not a number above 0; use a size in GB")
-    return found
+def _for_argparse(one: DeclaredArgument) -> dict[str, Any]:
+    """Return an argument as `ArgumentParser.add_argument` takes it."""
+    text = (one.help + _default(one.otherwise or one.default)).replace("%", "%%")
+    if one.is_flag:
+        return {"action": "store_true", "help": text}
+    about = {"help": text, "type": one.form.parse, "default": one.default, "choices": one.form.choices}
+    if one.metavar:
+        about["metavar"] = one.metavar
+    if one.is_positional and (one.is_list or one.is_optional):
+        about["nargs"] = ("*" if one.is_optional else "+") if one.is_list else "?"
+    elif one.is_list:
+        about["action"] = "append"
+    return {"dest": one.name, **about}
 
 
 def command_parser(name: str, parser: CommandParser | None = None) -> CommandParser:
     """Return the parser of a command; its arguments are imported, and nothing that carries it out."""
     parser = parser or CommandParser(prog=f"jointfrf {name}")
-    importlib.import_module(f"jointfrf.workbench.cli.arguments.{name}").add_arguments(parser)
-    _add_common(parser)
-    parser.describe_usage()
+    module = importlib.import_module(f"jointfrf.workbench.cli.arguments.{name}")
+    parser.declare(getattr(module, f"{name.capitalize()}Arguments"))
     return parser
 
 
@@ -282,7 +208,7 @@ class _Version(argparse.Action):
 
 
 def top_parser() -> tuple[CommandParser, dict[str, CommandParser]]:
-    """Return the parser of `jointfrf` itself, and those of its commands, still without their options."""
+    """Return the parser of `jointfrf` itself, and the parsers of its commands, still without their options."""
     parser = CommandParser(
         prog="jointfrf",
         usage="jointfrf COMMAND [options]",

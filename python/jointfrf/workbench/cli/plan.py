@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 
@@ -10,7 +9,6 @@ import numpy as np
 
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import FileContentError
-from jointfrf.extras import check_extras
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.workbench.assembly_file.keys import ReceptancesPart
 from jointfrf.workbench.assembly_file.measured import joint_words
@@ -18,9 +16,11 @@ from jointfrf.workbench.assembly_file.read import AssemblyPart, check_dofs, name
 from jointfrf.workbench.cases.catalogue import read_case_and_kind
 from jointfrf.workbench.cases.known_joint.exact import exact_frfs, frfs_by_differences
 from jointfrf.workbench.cases.known_joint.keys import KnownJointCase
+from jointfrf.workbench.cli.arguments.plan import GoalArguments, PartsArguments, PlanArguments
 from jointfrf.workbench.cli.frf import lines_of
-from jointfrf.workbench.cli.noise import noise_of
-from jointfrf.workbench.cli.usage import Output, UsageError, check_folder, listed, waiting, warn_of_ignored
+from jointfrf.workbench.cli.measured_file import noise_of
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import Output, UsageError, check_both, listed, warn_of_ignored
 from jointfrf.workbench.planning.assemblies import assemblies_needed
 from jointfrf.workbench.planning.joint_frfs import plan_joint_frfs
 from jointfrf.workbench.planning.plan import plan
@@ -33,21 +33,12 @@ __all__ = ["run"]
 _ALIKE = 1e-9
 #: A file of this name is a case: FRFs between all joint DOFs.
 _CASE = "case.toml"
-#: Options of an assembly that mean nothing for a case.
-_OF_PARTS = (
-    "--sensors", "--hits", "--keep-sensors", "--keep-hits", "--candidates", "--sensor-mass", "--targets", "--criterion",
-    "--within", "--budget", "--sensor-price", "--hit-price", "--spread", "--next",
-)  # fmt: skip
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: PlanArguments) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
-    check_folder("--report", args.report)
-    if args.report is not None:
-        check_extras("jinja2")
-    if (args.spread is None) != (args.next is None):
-        raise UsageError("only one of --spread and --next is given; give both, such as --spread 0.1 --next 0.3")
+    check_both(args, "spread", "next", ", such as --spread 0.1 --next 0.3")
     freq = lines_of(args)
     assert freq is not None  # --step is required
     if args.model.is_dir() or args.model.name == _CASE:
@@ -69,39 +60,28 @@ def run(args: argparse.Namespace) -> int:
     with waiting(f"plan of {args.model.name}"):
         assembly = file.assembly(freq, parts, used)
         found = plan(
-            assembly, freq, chosen[0], chosen[1], noise=noise_of(args.noise, args.floor),
-            averages=args.averages, targets=args.targets, criterion=args.criterion, within=args.within,
-            budget=args.budget, sensor_price=args.sensor_price, hit_price=args.hit_price, sensors=kept[0], hits=kept[1],
-            sensor_mass=args.sensor_mass or 0.0, fixed=file.keys.fixed,
+            assembly, freq, *chosen, noise=noise_of(args.noise, args.floor), averages=args.averages, sensors=kept[0],
+            hits=kept[1], sensor_mass=args.sensor_mass or 0.0, fixed=file.keys.fixed, **args.keywords(GoalArguments),
         )  # fmt: skip
-    written = []
     if args.report is not None:
         sketched = [part.sketched(letter, assembly.joints) for letter, part in parts.items()]
-        written.append(write_plan(found, args.report, parts=sketched, command=args.typed))
+        out.written.append(write_plan(found, args.report, parts=sketched, command=args.typed))
     if len(assembly.joints) > 1:
         out.say(*joint_words(assembly.joints, parts), "")
     out.say(found)
     needed = None
-    if args.spread is not None:
+    if args.spread is not None and args.next is not None:
         needed = assemblies_needed(args.next, args.spread, found.proposed.error)
         out.say("", _assemblies(needed, args.next, args.spread))
-    out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
     out.warn(*found.warnings)
-    out.give(
-        {
-            "model": str(args.model),
-            **asdict(found),
-            **found.content(),
-            "assemblies": needed,
-            "written": [str(path) for path in written],
-        }
-    )
+    content = {"assemblies": needed, "written": out.written}
+    out.give({"model": str(args.model), **asdict(found), **found.content(), **content})
     return 0
 
 
-def _of_case(args: argparse.Namespace, freq: FloatArray, out: Output) -> int:
-    """Say what FRFs between all joint DOFs of a case will know."""
-    of_parts = [name for name in _OF_PARTS if name.removeprefix("--").replace("-", "_") in args.given]
+def _of_case(args: PlanArguments, freq: FloatArray, out: Output) -> int:
+    """Print how well FRFs between all joint DOFs of a case determine the joint."""
+    of_parts = args.gave(PartsArguments.names())
     if of_parts:
         raise UsageError(f"a case has all FRFs between its joint DOFs; leave out {listed(of_parts)}")
     case, _ = read_case_and_kind(args.model if args.model.is_dir() else args.model.parent)
@@ -114,9 +94,10 @@ def _of_case(args: argparse.Namespace, freq: FloatArray, out: Output) -> int:
         freq, exact.interface(exact.h_c), case.joint, noise=noise_of(args.noise, args.floor),
         averages=args.averages, biased=biased or None,
     )  # fmt: skip
-    written = [] if args.report is None else [write_plan(found, args.report, command=args.typed)]
-    out.say(found, *([""] if written else []), *(f"wrote {path}" for path in written))
-    out.give({"model": str(args.model), **asdict(found), "written": [str(path) for path in written]})
+    if args.report is not None:
+        out.written.append(write_plan(found, args.report, command=args.typed))
+    out.say(found)
+    out.give({"model": str(args.model), **asdict(found), "written": out.written})
     return 0
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import time
@@ -18,7 +17,9 @@ from jointfrf.parallel.pool import available_cores
 from jointfrf.workbench.cases.catalogue import UnknownCaseError, find_case, list_cases, run_case
 from jointfrf.workbench.cases.keys import Case
 from jointfrf.workbench.cases.workers import Workers, started_workers
-from jointfrf.workbench.cli.usage import Output, UsageError, check_out, waiting
+from jointfrf.workbench.cli.arguments.run import RunArguments, RunOneArguments
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import Output, UsageError
 from jointfrf.workbench.report.table import Table, as_text
 
 __all__ = ["run"]
@@ -27,10 +28,9 @@ __all__ = ["run"]
 _TOGETHER = 3
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: RunArguments) -> int:
     """Carry out the command."""
     check_extras("matplotlib", "jinja2")
-    check_out("--out", options.out)
     try:
         folders = [find_case(word).resolve() for word in options.cases] or list_cases()
     except UnknownCaseError as error:
@@ -58,12 +58,12 @@ def run(options: argparse.Namespace) -> int:
 
 def _run_all(
     folders: list[Path],
-    options: argparse.Namespace,
+    options: RunArguments,
     workers: Workers,
     threads: ThreadPoolExecutor,
     say: Callable[[str], None],
 ) -> list[Path]:
-    """Run cases and say what they yield, in their order; the next ones begin where processes would have nothing to do.
+    """Run cases and print their results, in their order; the next ones begin where processes would have nothing to do.
 
     Returns
     -------
@@ -105,11 +105,11 @@ class _Begun:
         self.count(done, total)
 
     def read(self) -> Iterator[str]:
-        """Give what the case says, until it ends."""
+        """Give the text of the case, until it ends."""
         while (text := self.said.get()) is not None:
             yield text
 
-    def run(self, folder: Path, options: argparse.Namespace, workers: Workers) -> Path:
+    def run(self, folder: Path, options: RunArguments, workers: Workers) -> Path:
         """Run it in its turn."""
         assert workers.turn is not None
         try:
@@ -119,12 +119,12 @@ class _Begun:
             self.said.put(None)
 
 
-def _run_one(folder: Path, options: argparse.Namespace, workers: Workers, say: Callable[[str], None]) -> Path:
+def _run_one(folder: Path, options: RunArguments, workers: Workers, say: Callable[[str], None]) -> Path:
     """Run a case: its tables are printed before its figures are drawn."""
     start = time.perf_counter()
     output = run_case(
-        folder, options.out, realisations=options.realisations, at_most=options.at_most, png=options.png,
-        workers=workers, show=lambda case, tables: say("\n".join(_shown(case, tables))),
+        folder, options.out, **options.keywords(RunOneArguments), workers=workers,
+        show=lambda case, tables: say("\n".join(_shown(case, tables))),
     )  # fmt: skip
     say(f"{time.perf_counter() - start:.1f} s, report: {output.report}\n")
     return output.report

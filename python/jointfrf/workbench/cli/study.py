@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,24 +11,19 @@ from jointfrf.extras import check_extras, import_extra
 from jointfrf.files import OwnFolder
 from jointfrf.parallel.pool import AnyExecutor, available_cores, check_processes, safe_environment
 from jointfrf.workbench.cases.catalogue import UnknownCaseError
-from jointfrf.workbench.cli.usage import Output, UsageError, check_out, listed, waiting, warn_of_ignored
+from jointfrf.workbench.cli.arguments.study import ComputingArguments, StudyArguments
+from jointfrf.workbench.cli.progress import waiting
+from jointfrf.workbench.cli.usage import Output, UsageError, listed, warn_of_ignored
 from jointfrf.workbench.studies.design import StudyDesign, parse_factor
 from jointfrf.workbench.studies.result import StudyResult
 from jointfrf.workbench.studies.run import merge_studies, study
 
 __all__ = ["run"]
 
-#: Options that merge does not use.
-_OF_COMPUTING = (
-    "--realisations", "--factor", "--arrangement", "--estimator", "--noise", "--first", "--count", "--jobs",
-    "--executor",
-)  # fmt: skip
 
-
-def run(options: argparse.Namespace) -> int:
+def run(options: StudyArguments) -> int:
     """Carry out the command."""
     check_extras("matplotlib", "jinja2", *(["pyarrow"] if "parquet" in options.values else []))
-    check_out("--out", options.out)
     out = Output(options)
     is_merge = options.words[0] == "merge"
     is_part = not is_merge and (options.first is not None or options.count is not None)
@@ -44,19 +38,19 @@ def run(options: argparse.Namespace) -> int:
     page = found.report()
     files = {kind: found.save_values(kind) for kind in options.values}
     out.say(found, "", *(f"{kind}: {path}" for kind, path in files.items()), f"report: {page}")
-    written = {kind: str(path) for kind, path in files.items()}
+    written = {str(kind): str(path) for kind, path in files.items()}
     out.give({**found.to_dict(), "folder": str(found.folder), "report": str(page), **written})
     return 0
 
 
-def _merged(options: argparse.Namespace) -> StudyResult:
+def _merged(options: StudyArguments) -> StudyResult:
     if len(options.words) < 2 or options.out is None:
         raise UsageError("folders of parts or --out are missing; use jointfrf study merge PART... --out DIR")
-    warn_of_ignored(options, _OF_COMPUTING, "merge computes nothing")
+    warn_of_ignored(options, ComputingArguments.names(), "merge computes nothing")
     return merge_studies(options.words[1:], options.out)
 
 
-def _studied(options: argparse.Namespace, is_part: bool) -> StudyResult:
+def _studied(options: StudyArguments, is_part: bool) -> StudyResult:
     if len(options.words) > 1:
         raise UsageError(f"several cases are given, {listed(options.words)}; name one")
     (case,) = options.words
@@ -100,7 +94,7 @@ def _factors(words: list[str]) -> dict[str, Any]:
     return factors
 
 
-def _range(options: argparse.Namespace) -> range:
+def _range(options: StudyArguments) -> range:
     if options.first is None or options.count is None:
         raise UsageError("only one of --first and --count is given; give both")
     return range(options.first, options.first + options.count)

@@ -1,23 +1,23 @@
-"""What commands share: errors of usage, what they print, types of words, progress."""
+"""Errors of usage, messages in the words of the command line, printed results, files to be written, failed tests."""
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import re
-import shutil
 import sys
-import threading
-import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from jointfrf.extras import MissingPackageError
+from jointfrf.extras import MissingPackageError, check_extras
 from jointfrf.spelling import cut, message, visible
+from jointfrf.workbench.cli.progress import clear_line
+
+if TYPE_CHECKING:
+    from jointfrf.workbench.cli.arguments.declaration import Arguments
 
 __all__ = [
     "EXPECTED",
@@ -26,23 +26,18 @@ __all__ = [
     "OptionWarning",
     "Output",
     "UsageError",
+    "check_both",
+    "check_file_in_folder",
     "check_folder",
+    "check_frf_file",
     "check_out",
     "complain",
     "listed",
     "plain",
-    "positive",
     "sentence",
-    "shown_progress",
     "shown_warnings",
-    "waiting",
     "warn_of_ignored",
 ]
-
-#: Seconds after which the speed so far predicts the time left; a line that changes twice a second is easily read.
-_SETTLED = 0.5
-#: Seconds to the first line of progress on a stream that is no terminal, and between lines; characters of a bar.
-FIRST_LINE, _NEXT_LINE, _BAR = 3.0, 10.0, 20
 
 
 class UsageError(Exception):
@@ -68,7 +63,6 @@ _WORDS = tuple(
         (r"\bmapping (\w+=)", r"--map \1"),
         (r"\b(by|of|in) mapping\b", r"\1 --map"),
         (r"\bgive axes=", "give --map axes="),
-        (r"\bmapping (\w+)=", r"--map \1="),
         (r"\bgive unit=(?=')", "give --unit "),
         (r"\bgive unit=", "give --unit"),
         (r"\bwrite (.+) or give unit=", r"write \1 or give --unit"),
@@ -96,7 +90,7 @@ _WORDS = tuple(
 
 def complain(kind: str, about: object) -> None:
     """Print a warning or an error as one line that does nothing to a terminal: a file may have any name."""
-    _LINE.clear()
+    clear_line()
     print(f"jointfrf: {kind}: {message(_in_options(cut(str(about))))}", file=sys.stderr)
 
 
@@ -128,26 +122,37 @@ def listed(names: Sequence[str]) -> str:
     return ", ".join([*names[:-2], " and ".join(names[-2:])])
 
 
-def warn_of_ignored(args: argparse.Namespace, names: Iterable[str], why: str) -> None:
+def warn_of_ignored(args: Arguments, names: Iterable[str], why: str) -> None:
     """Warn of options that were given and have no effect."""
-    found = [name for name in names if name.removeprefix("--").replace("-", "_") in args.given]
+    found = args.gave(names)
     if found:
         verb = "have" if found[1:] else "has"
         warnings.warn(f"{listed(found)} {verb} no effect: {why}", OptionWarning, stacklevel=2)
 
 
-class Output:
-    """Where the text and the numbers of a command go, by its options `--json` and `--quiet`."""
+def check_both(args: Arguments, one: str, other: str, example: str = "") -> None:
+    """Raise an error if only one of two options is given."""
+    if (getattr(args, one) is None) != (getattr(args, other) is None):
+        raise UsageError(f"only one of --{one} and --{other} is given; give both{example}")
 
-    def __init__(self, args: argparse.Namespace) -> None:
-        self._is_json: bool = args.json
-        self._is_quiet: bool = args.quiet
-        self._warned: list[str] = args.warned
+
+class Output:
+    """The text and the numbers of a command, printed as its options `--json` and `--quiet` state.
+
+    Attributes
+    ----------
+    written : list of Path
+        Files that the command wrote.
+    """
+
+    def __init__(self, args: Arguments) -> None:
+        self._is_json, self._is_quiet, self._warned = args.json, args.quiet, args.warned
+        self.written: list[Path] = []
 
     def say(self, *lines: object) -> None:
         """Print lines of text, unless JSON or nothing is wanted."""
         if lines and not (self._is_json or self._is_quiet):
-            _LINE.clear()
+            clear_line()
             print(*(visible(str(line), "\n\t") for line in lines), sep="\n", flush=True)
 
     def warn(self, *texts: object) -> None:
@@ -157,16 +162,17 @@ class Output:
             complain("warning", text)
 
     def give(self, content: Mapping[str, Any]) -> None:
-        """Print the result as JSON where that is wanted, with all warnings at its top level."""
+        """Print the files written and, where that is wanted, the result as JSON with all warnings at its top level."""
+        self.say(*([""] if self.written else []), *(f"wrote {path}" for path in self.written))
         if self._is_json:
             warned = [_in_options(cut(str(text))) for text in (*content.get("warnings", ()), *self._warned)]
-            whole = {**content, "warnings": list(dict.fromkeys(warned))}
-            _LINE.clear()
+            whole = {**content, "written": self.written, "warnings": list(dict.fromkeys(warned))}
+            clear_line()
             print(json.dumps(plain(whole), indent=2, allow_nan=False))
 
 
 def plain(value: Any) -> Any:
-    """Return a value as JSON holds it: what is not finite becomes null, a complex number a pair."""
+    """Return a value as JSON contains it: a number that is not finite becomes null, a complex number a pair."""
     if isinstance(value, Mapping):
         return {str(key): plain(each) for key, each in value.items()}
     if hasattr(value, "tolist"):  # arrays and numbers of numpy
@@ -208,133 +214,32 @@ def check_out(option: str, path: Path | None) -> None:
         raise UsageError(f"{option}: {there} is a file; name a folder")
 
 
-def positive(word: str, least: int = 1) -> int:
-    """Return a whole number of at least 1, or another least one."""
-    if not word.isdecimal() or int(word) < least:
-        raise argparse.ArgumentTypeError(f"{word!r} is no whole number of at least {least}; give one")
-    return int(word)
+def check_file_in_folder(option: str, path: Path) -> None:
+    """Check that a file can be written there, whose folder need not exist."""
+    check_out(option, path.parent)
+    if path.is_dir():
+        raise UsageError(f"{option}: {path} is a folder; name a file")
 
 
-class _Stage:
-    """A part of a command that takes time, and how much of it is done."""
+def check_frf_file(option: str, path: Path) -> None:
+    """Check that FRFs can be written to a path.
 
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.start = self._counted_from = self._counted_at = time.monotonic()
-        self._done, self._total = 0, 0
+    Raises
+    ------
+    UsageError
+        No format has its suffix, there is no such folder, or it is one.
+    MissingPackageError
+        A package for the format is not installed.
+    """
+    from jointfrf.io.formats import check_suffix
 
-    def count(self, done: int, total: int) -> None:
-        """Note how much is done; a part is finished when all is, and the next one may begin.
-
-        Calls may come from several threads, in another order than their counts: progress is never taken back.
-        """
-        with _LOCK:
-            self._counted_at = time.monotonic()
-            if done == total:
-                self._counted_from, self._done, self._total = self._counted_at, 0, 0
-            elif done * self._total >= self._done * total:
-                self._done, self._total = done, total
-
-    @property
-    def share(self) -> float | None:
-        """Finished share of the stage; None if nothing counts."""
-        return self._done / self._total if self._total else None
-
-    def left(self, now: float) -> str:
-        """Return the finished share and the time left."""
-        if self.share is None:
-            return ""
-        spent = self._counted_at - self._counted_from
-        return f", {100 * self.share:.0f} %{_time_left(spent, now - self._counted_at, self._done, self._total)}"
-
-
-#: The stages under way, each within the one before it.
-_STAGES: list[_Stage] = []
-_LOCK = threading.RLock()
-
-
-class _Line:
-    """The line of a terminal that shows the progress: other text takes its place."""
-
-    is_there = False
-
-    def write(self, text: str) -> None:
-        with _LOCK:
-            print(
-                f"\r\x1b[K{visible(text)}"[: 3 + shutil.get_terminal_size().columns],
-                end="",
-                file=sys.stderr,
-                flush=True,
-            )
-            self.is_there = bool(text)
-
-    def clear(self) -> None:
-        if self.is_there:
-            self.write("")
-
-
-_LINE = _Line()
-
-
-def _progress_text(now: float, *, bar: bool) -> str:
-    """Return the innermost stage with its time, and the share of the innermost stage that counts."""
-    with _LOCK:
-        stages = _STAGES[:]
-    counted = next((one for one in reversed(stages) if one.share is not None), None)
-    text = f"{stages[-1].name}: {now - stages[-1].start:.0f} s"
-    if counted is None:
-        return text
-    filled = "#" * int(_BAR * (counted.share or 0.0))
-    return f"{f'[{filled:-<{_BAR}}] ' if bar else ''}{text}{counted.left(now)}"
-
-
-def _show_progress(ended: threading.Event) -> None:
-    """Show the stage under way: on a terminal all the time, elsewhere a line now and then."""
-    shown = time.monotonic() + FIRST_LINE - _NEXT_LINE
-    is_terminal = sys.stderr.isatty()
-    while not ended.wait(_SETTLED):
-        now = time.monotonic()
-        if is_terminal:
-            _LINE.write(_progress_text(now, bar=True))
-        elif now - shown >= _NEXT_LINE:
-            shown = now
-            print(f"jointfrf: {visible(_progress_text(now, bar=False))}", file=sys.stderr, flush=True)
-
-
-@contextmanager
-def shown_progress(command: str) -> Iterator[None]:
-    """Show what takes time inside, on standard error, until the end."""
-    ended = threading.Event()
-    clock = threading.Thread(target=_show_progress, args=(ended,), daemon=True)
-    with waiting(command):
-        clock.start()
-        try:
-            yield
-        finally:
-            ended.set()
-            clock.join()
-            _LINE.clear()
-
-
-@contextmanager
-def waiting(stage: str) -> Iterator[Callable[[int, int], None]]:
-    """Name the stage of a command that is under way; yields what takes the number done and their total."""
-    found = _Stage(stage)
-    with _LOCK:
-        _STAGES.append(found)
     try:
-        yield found.count
-    finally:
-        with _LOCK:
-            _STAGES.remove(found)
-
-
-def _time_left(spent: float, since: float, done: int, total: int) -> str:
-    """Return the time left at the speed until the last count, some time since; nothing before the first count."""
-    if done == 0 or spent < _SETTLED:
-        return ""
-    left = max(0.0, spent * (total - done) / done - since)
-    return f", about {left:.0f} s left" if left < 90 else f", about {left / 60:.0f} min left"
+        needed = check_suffix(path).package
+    except ValueError as error:
+        raise UsageError(error) from error
+    check_folder(option, path)
+    if needed:
+        check_extras(needed)
 
 
 class Failures:
@@ -346,7 +251,7 @@ class Failures:
         Sentences by the names of the tests.
     """
 
-    def __init__(self, args: argparse.Namespace) -> None:
+    def __init__(self, args: Arguments) -> None:
         self._stop_if_interrupted: Callable[[], None] = args.stop_if_interrupted
         self._is_first = True
         self.found: dict[str, str] = {}

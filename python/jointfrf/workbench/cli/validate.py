@@ -2,37 +2,22 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 
-from jointfrf.channels.check.check import warn_of_sets
 from jointfrf.errors import FileContentError
-from jointfrf.frf.merge import merge_frfs
-from jointfrf.identification.joint_file import read_joint_file
 from jointfrf.identification.validation import compare_frfs
 from jointfrf.io import FrfSet, write_frfs
-from jointfrf.workbench.cli.couple import coupled, renumbered, shifted
-from jointfrf.workbench.cli.frf import check_target, lines_of, measured_sets, read_structures
-from jointfrf.workbench.cli.measured_file import reading_options
-from jointfrf.workbench.cli.usage import Output, waiting
+from jointfrf.workbench.cli.arguments.validate import ValidateArguments
+from jointfrf.workbench.cli.couple import coupled_parts
+from jointfrf.workbench.cli.usage import Output
 
 __all__ = ["run"]
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: ValidateArguments) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
-    if args.output is not None:
-        check_target(args.output)
-    found = read_joint_file(args.joint)
-    a, b, *parts = read_structures([args.a, args.b, *args.measured], lines_of(args), **reading_options(args))
-    measured = parts[0] if len(parts) == 1 else merge_frfs(parts)
-    if args.band is not None:
-        a, b, measured = (each.select(args.band) for each in (a, b, measured))
-    b = renumbered(b, args.renumber_b, args.shift_b)
-    warn_of_sets(*measured_sets(args.a, a, args.b, b), measured)
-    with waiting("coupling"):
-        assembly = coupled(a, b, found.joint, (args.j, shifted(args.k, args.renumber_b)), args.at)
+    assembly, _, (measured,) = coupled_parts(args, *args.measured)
     shared, unused = _shared(measured, assembly)
     own = shared.matrix(shared.responses, shared.excitations, allow_missing=True)
     made = assembly.matrix(shared.responses, shared.excitations)

@@ -1,50 +1,52 @@
-"""Arguments of `jointfrf frf`, and of frequency lines."""
-
-from __future__ import annotations
+"""Arguments of `jointfrf frf`."""
 
 from pathlib import Path
 
 from jointfrf.choices import format_names
-from jointfrf.workbench.cli.arguments.measured_file import add_reading_arguments, parse_band, words
-from jointfrf.workbench.cli.parser import CommandParser
+from jointfrf.workbench.cli.arguments.declaration import Arguments, option, positional
+from jointfrf.workbench.cli.arguments.measured_file import ReadingArguments
+from jointfrf.workbench.cli.arguments.structures import LineArguments
+from jointfrf.workbench.cli.arguments.words import NewFrfs, Words
 
-__all__ = ["MATRICES", "MOST_DOFS", "add_arguments", "add_line_arguments"]
+__all__ = ["MOST_DOFS", "FrfArguments", "MatrixArguments"]
 
-#: Options that name files of matrices.
-MATRICES = ("stiffness", "mass", "damping", "structural_damping")
 #: FRFs between more DOFs are hardly meant.
 MOST_DOFS = 240
 
 
-def add_arguments(parser: CommandParser) -> None:
-    """Describe the arguments of the command."""
-    parser.description = (
+class MatrixArguments(Arguments):
+    """A model by its matrices; keywords are the keys of a model of kind matrices."""
+
+    heading = "a model by its matrices (Matrix Market or NPZ)"
+
+    stiffness: str | None = option("file of the stiffness K, N/m", "FILE")
+    mass: str | None = option("file of the mass M, kg", "FILE")
+    damping: str | None = option("file of the viscous damping C, N s/m", "FILE")
+    structural_damping: str | None = option("file of the structural damping H, N/m", "FILE")
+    loss_factor: float = option("loss factor of the stiffness", "ETA", 0.0)
+    dof_names: str | None = option("text file, one DOF a line: 12:y, or 12 2", "FILE", keyword="dofs")
+
+
+class _LineFileArguments(ReadingArguments):
+    heading = "the file of --lines-of"
+
+
+class FrfArguments(LineArguments, MatrixArguments, _LineFileArguments):
+    """Arguments of the command."""
+
+    description = (
         f"Compute receptances of a model and write them as {format_names(written=True)}. The model is a TOML file with "
         "the keys of a substructure of a case (chain, beam, plate, brick-beam, matrices, modes) or of a part of an "
         "assembly, or matrices named by options."
     )
-    parser.requires("MODEL", "--output", "--band", "--step")
-    parser.requires("MODEL", "--output", "--lines-of")
-    parser.requires("--stiffness", "--mass", "--dof-names", "--output", "--band", "--step")
-    parser.examples.append("jointfrf frf cases/two-beams/a.toml --band 20:800 --step 1 --output a.uff")
-    parser.add_argument(
-        "model", nargs="?", type=Path, metavar="MODEL", help="TOML file of a model; or --stiffness, --mass, --dof-names"
+    ways = (
+        ("MODEL", "--output", "--band", "--step"),
+        ("MODEL", "--output", "--lines-of"),
+        ("--stiffness", "--mass", "--dof-names", "--output", "--band", "--step"),
     )
-    parser.option("--output FILE", f"file to write: {format_names(written=True)}", Path)
-    add_line_arguments(parser)
-    parser.option("--lines-of FILE", "file of FRFs whose frequency lines are used, instead of --band and --step", Path)
-    parser.option("--points DOFS", "DOFs of the model: 3:y,3:theta", words, otherwise=f"all, up to {MOST_DOFS}")
-    parser.heading("a model by its matrices (Matrix Market or NPZ)")
-    names = ("stiffness K, N/m", "mass M, kg", "viscous damping C, N s/m", "structural damping H, N/m")
-    for name, what in zip(MATRICES, names, strict=True):
-        parser.option(f"--{name.replace('_', '-')} FILE", f"file of the {what}")
-    parser.option("--loss-factor ETA", "loss factor of the stiffness", float, 0.0)
-    parser.option("--dof-names FILE", "text file, one DOF a line: 12:y, or 12 2")
-    parser.heading("the file of --lines-of")
-    add_reading_arguments(parser)
+    examples = ("jointfrf frf cases/two-beams/a.toml --band 20:800 --step 1 --output a.uff",)
 
-
-def add_line_arguments(parser: CommandParser) -> None:
-    """Describe the frequency lines of models."""
-    parser.option("--band LOW:HIGH", "first and last frequency, Hz", parse_band)
-    parser.option("--step HZ", "spacing of the frequency lines of models, Hz; needs --band", float)
+    model: Path | None = positional("TOML file of a model; or --stiffness, --mass, --dof-names", "MODEL", optional=True)
+    output: NewFrfs | None = option(f"file to write: {format_names(written=True)}")
+    lines_of: Path | None = option("file of FRFs whose frequency lines are used, instead of --band and --step")
+    points: Words | None = option("DOFs of the model: 3:y,3:theta", "DOFS", otherwise=f"all, up to {MOST_DOFS}")

@@ -1,216 +1,30 @@
-"""Arguments of a file of FRFs, and the points and DOFs of the joint in it."""
-
-from __future__ import annotations
+"""Arguments of a file of FRFs: how it is read, which joint is in it, masses and noise that the user states."""
 
 import argparse
 import math
-from collections.abc import Iterable
+from dataclasses import field
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
-from jointfrf.choices import MAPPING_FIELDS, format_names
-from jointfrf.directions import direction_names
+from jointfrf.choices import MAPPING_FIELDS, POWER_OF_I_OMEGA, format_names
 from jointfrf.spelling import did_you_mean
-from jointfrf.workbench.cli.parser import CommandParser
-from jointfrf.workbench.cli.usage import positive
+from jointfrf.workbench.cli.arguments.declaration import Arguments, Form, flag, option, positional
+from jointfrf.workbench.cli.arguments.words import Band, Dofs, NodeList, Point, Words, whole
+from jointfrf.workbench.cli.usage import UsageError
 
 __all__ = [
-    "Nodes",
-    "add_file_arguments",
-    "add_joint_arguments",
-    "add_reading_arguments",
-    "joint_dofs",
-    "nodes",
-    "numbers",
-    "parse_band",
-    "point",
-    "shown_nodes",
-    "words",
+    "BandArguments",
+    "FileArguments",
+    "Floor",
+    "FloorArguments",
+    "JointArguments",
+    "MassArguments",
+    "NoiseArguments",
+    "PlaceArguments",
+    "PointArguments",
+    "ReadingArguments",
 ]
-
-#: Longer ranges of nodes are slips.
-_MOST_NODES = 100_000
-#: Nodes that a message lists.
-_NODES_SHOWN = 40
-
-
-class Nodes(NamedTuple):
-    """Nodes as they were named: one by one, and ranges of which not all need exist.
-
-    Attributes
-    ----------
-    numbers : tuple of int
-        All.
-    single : frozenset of int
-        Those that were named by themselves.
-    """
-
-    numbers: tuple[int, ...]
-    single: frozenset[int]
-
-    def among(self, known: Iterable[int], source: object) -> list[int]:
-        """Return the nodes that there are.
-
-        Raises
-        ------
-        FileContentError
-            One that was named by itself is not there, or none of all.
-        """
-        from jointfrf.errors import FileContentError  # imports numpy, which a parser does not need
-
-        there = set(known)
-        missing = [node for node in self.numbers if node in self.single and node not in there]
-        found = [node for node in self.numbers if node in there]
-        if missing or not found:
-            which = f"node {missing[0]}" if missing else f"nodes {self.numbers[0]} to {self.numbers[-1]}"
-            raise FileContentError(f"{source} has no FRF at {which}; use nodes of {shown_nodes(there)}")
-        return found
-
-
-def shown_nodes(found: Iterable[int]) -> str:
-    """Write nodes in their order, neighbours as ranges: 101 to 104, 201."""
-    ranges: list[list[int]] = []
-    for node in sorted(found):
-        if ranges and node == ranges[-1][1] + 1:
-            ranges[-1][1] = node
-        else:
-            ranges.append([node, node])
-    texts = [str(a) if a == b else f"{a}, {b}" if b == a + 1 else f"{a} to {b}" for a, b in ranges]
-    return ", ".join(texts[:_NODES_SHOWN]) + (", ..." if len(texts) > _NODES_SHOWN else "")
-
-
-def words(text: str) -> list[str]:
-    """Return the words between commas."""
-    return [word.strip() for word in text.split(",") if word.strip()]
-
-
-def nodes(text: str) -> Nodes:
-    """Return nodes: numbers between commas, and ranges like 101:116, ends included."""
-    found: list[int] = []
-    single: set[int] = set()
-    for word in words(text):
-        first, colon, last = word.partition(":")
-        try:
-            low, high = int(first), int(last if colon else first)
-        except ValueError:
-            low, high = 0, 0
-        if not 0 < low <= high:
-            raise argparse.ArgumentTypeError(f"{word!r} is no node number or range; use the form 102,104 or 101:116")
-        if high - low >= _MOST_NODES:
-            raise argparse.ArgumentTypeError(f"{word} are too many nodes; name at most {_MOST_NODES}")
-        found += range(low, high + 1)
-        single |= set() if colon else {low}
-    if not found:
-        raise argparse.ArgumentTypeError(f"{text!r} names no nodes; use the form 102,104 or 101:116")
-    return Nodes(tuple(dict.fromkeys(found)), frozenset(single))
-
-
-def joint_dofs(text: str) -> list[str]:
-    """Return the names of joint DOFs, theta_x for rx."""
-    try:
-        found = direction_names(words(text))
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
-    if not found:
-        raise argparse.ArgumentTypeError(f"{text!r} names no DOFs; use the form y,theta_x")
-    return list(found)
-
-
-def numbers(text: str, count: int, like: tuple[str, str]) -> tuple[float, ...]:
-    """Return some finite numbers between commas; `like` is what they are and an example, for the message."""
-    try:
-        found = tuple(float(word) for word in words(text))
-    except ValueError:
-        found = ()
-    if len(found) != count or not all(map(math.isfinite, found)):
-        raise argparse.ArgumentTypeError(f"{text!r} is no {like[0]}; use the form {like[1]}")
-    return found
-
-
-def point(text: str) -> tuple[float, ...]:
-    """Return the coordinates of a point, m."""
-    return numbers(text, 3, ("point", "x,y,z in m: 0.0625,0,0"))
-
-
-def parse_band(text: str) -> tuple[float, float]:
-    """Return the ends of a band in Hz."""
-    try:
-        low, high = (float(part) for part in text.split(":"))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no band; use the form 200:550 (Hz)") from None
-    return low, high
-
-
-def add_file_arguments(parser: CommandParser) -> None:
-    """Describe the file, the points on both sides, the DOFs, the bands."""
-    parser.add_argument(
-        "files",
-        nargs="+",
-        type=Path,
-        metavar="FILE",
-        help=f"FRFs of the points around the joint: {format_names()}; several files of one test are merged",
-    )
-    add_joint_arguments(parser)
-    parser.option(
-        "--points NAMES",
-        "names of several joint points, bolt1,bolt2: one node of --j and of --k for each, with all of --dofs in the "
-        "file; the DOFs are named bolt1.x, ...",
-        words,
-    )
-
-
-def add_joint_arguments(parser: CommandParser) -> None:
-    """Describe the points on both sides, the DOFs, the bands, the quantity: what belongs to a project."""
-    parser.heading("the joint in the file")
-    parser.option("--j NODES", "nodes on side j: 102,104 or 101:116", nodes)
-    parser.option("--k NODES", "nodes on side k; without --at in the order of --j", nodes)
-    parser.option(
-        "--dofs DOFS", "joint DOFs out of x,y,z,theta_x,theta_y,theta_z (or rx,ry,rz), such as y,theta_x", joint_dofs
-    )
-    parser.option(
-        "--at X,Y,Z",
-        "reference point of the joint in m: its DOFs are the DOFs of virtual points there, from all channels of the "
-        "nodes; without it, the nodes of each side lie along a line",
-        point,
-    )
-    parser.option("--at-k X,Y,Z", "reference point of side k in m", point, otherwise="the point of --at")
-    parser.option(
-        "--channels TABLE",
-        "TOML or CSV table of sensors and impacts (side, position, direction), if the file of FRFs lacks them; needs "
-        "--at",
-        Path,
-    )
-    parser.option(
-        "--spacing METRES",
-        "distance between neighbouring nodes along a line, if the file has no coordinates; needs --axis",
-        float,
-    )
-    parser.option("--axis", "direction of the line of nodes; needs --spacing", ("x", "y", "z"))
-    parser.option("--band LOW:HIGH", "frequency band in Hz; may be repeated", parse_band, repeated=True)
-    add_reading_arguments(parser)
-
-
-def add_reading_arguments(parser: CommandParser) -> None:
-    """Describe the options that state the quantity of the FRFs and their place in files."""
-    parser.option(
-        "--quantity", "quantity of the FRFs, if the file does not state it", ("receptance", "mobility", "accelerance")
-    )
-    parser.option("--force-quantity", "use --quantity and --unit even if the file states another quantity or unit")
-    parser.option(
-        "--unit UNIT",
-        "unit of the FRFs, if the file does not state one that is understood: g/N, mm/kN, 'dB re 1 m/N'; other units "
-        "by name: frequency=kHz, phase=rad, coordinates=mm; several between commas",
-        _unit,
-    )
-    parser.option("--skip-lines N", "lines before the heading of a text table", partial(positive, least=0))
-    parser.option(
-        "--map FIELD=NAME",
-        f"name of a field in a MATLAB, NPZ or HDF5 file: {', '.join(MAPPING_FIELDS)}; responses and excitations also "
-        "as names (responses=1:x,2:x), axes as freq,out,in in their order; may be repeated",
-        _field,
-        repeated=True,
-    )
 
 
 def _unit(text: str) -> str:
@@ -224,10 +38,152 @@ def _unit(text: str) -> str:
 
 
 def _field(text: str) -> tuple[str, str]:
-    field, equals, name = text.partition("=")
-    if not equals or field not in MAPPING_FIELDS or not name:
-        hint = did_you_mean(field, MAPPING_FIELDS) if equals else ""
+    name, equals, value = text.partition("=")
+    if not equals or name not in MAPPING_FIELDS or not value:
+        hint = did_you_mean(name, MAPPING_FIELDS) if equals else ""
         raise argparse.ArgumentTypeError(
             f"{text!r} is not FIELD=NAME; use a field of {', '.join(MAPPING_FIELDS)}{hint}"
         )
-    return field, name
+    return name, value
+
+
+class ReadingArguments(Arguments):
+    """Quantity of the FRFs and their place in files."""
+
+    quantity: Literal["receptance", "mobility", "accelerance"] | None = option(
+        "quantity of the FRFs, if the file does not state it"
+    )
+    force_quantity: bool = flag("use --quantity and --unit even if the file states another quantity or unit")
+    unit: Annotated[str, Form("UNIT", _unit)] | None = option(
+        "unit of the FRFs, if the file does not state one that is understood: g/N, mm/kN, 'dB re 1 m/N'; other units "
+        "by name: frequency=kHz, phase=rad, coordinates=mm; several between commas"
+    )
+    skip_lines: Annotated[int, Form("N", partial(whole, least=0))] = option(
+        "lines before the heading of a text table", default=0
+    )
+    map: list[Annotated[tuple[str, str], Form("FIELD=NAME", _field)]] = option(
+        f"name of a field in a MATLAB, NPZ or HDF5 file: {', '.join(MAPPING_FIELDS)}; responses and excitations also "
+        "as names (responses=1:x,2:x), axes as freq,out,in in their order; may be repeated",
+        default=[],
+        keyword="mapping",
+    )
+
+    def reading(self) -> dict[str, Any]:
+        """Return the keyword arguments of `jointfrf.io.read_frfs`."""
+        if self.force_quantity and self.quantity is None and self.unit is None:
+            raise UsageError("--force-quantity has no effect without --quantity or --unit; leave it out")
+        mapping = dict(self.map)
+        if len(mapping) < len(self.map):
+            raise UsageError("--map names a field twice; name each field once")
+        return self.keywords(ReadingArguments) | {"mapping": mapping, "unit": self.unit or ""}
+
+
+class PlaceArguments(Arguments):
+    """The points on both sides, and the DOFs."""
+
+    heading = "the joint in the file"
+
+    j: NodeList | None = option("nodes on side j: 102,104 or 101:116")
+    k: NodeList | None = option("nodes on side k; without --at in the order of --j")
+    dofs: Dofs | None = option("joint DOFs out of x,y,z,theta_x,theta_y,theta_z (or rx,ry,rz), such as y,theta_x")
+    at: Point | None = option(
+        "reference point of the joint in m: its DOFs are the DOFs of virtual points there, from all channels of the "
+        "nodes; without it, the nodes of each side lie along a line"
+    )
+    at_k: Point | None = option("reference point of side k in m", otherwise="the point of --at")
+    channels: Path | None = option(
+        "TOML or CSV table of sensors and impacts (side, position, direction), if the file of FRFs lacks them; needs "
+        "--at",
+        "TABLE",
+    )
+    spacing: float | None = option(
+        "distance between neighbouring nodes along a line, if the file has no coordinates; needs --axis", "METRES"
+    )
+    axis: Literal["x", "y", "z"] | None = option("direction of the line of nodes; needs --spacing")
+
+
+class BandArguments(Arguments):
+    """Bands of the lines that are used."""
+
+    band: list[Band] | None = option("frequency band in Hz; may be repeated")
+
+
+class JointArguments(PlaceArguments, BandArguments, ReadingArguments):
+    """The joint in files, and how these are read: properties of a project."""
+
+    files: list[Path] = field(default_factory=list)
+
+    @property
+    def source(self) -> str:
+        """Names of the files without their folders."""
+        return ", ".join(path.name for path in self.files)
+
+
+class PointArguments(Arguments):
+    """Several joint points."""
+
+    points: Words | None = option(
+        "names of several joint points, bolt1,bolt2: one node of --j and of --k for each, with all of --dofs in the "
+        "file; the DOFs are named bolt1.x, ..."
+    )
+
+
+class FileArguments(JointArguments, PointArguments):
+    """The files of one test, and the joint in them."""
+
+    heading = "the joint in the file"
+
+    files: list[Path] = positional(
+        f"FRFs of the points around the joint: {format_names()}; several files of one test are merged", "FILE"
+    )
+
+
+class MassArguments(Arguments):
+    """Masses that the user states."""
+
+    mass_j: float | None = option(
+        "mass of side j, kg: an error if the FRFs show another one (their unit is wrong)", "KG"
+    )
+    mass_k: float | None = option("mass of side k, kg", "KG")
+    mass: float | None = option("mass of both sides together, kg", "KG")
+
+
+class Floor(NamedTuple):
+    """A floor, and the quantity in which it is constant."""
+
+    level: float
+    quantity: str
+
+
+def _floor(word: str) -> Floor:
+    level, colon, quantity = word.partition(":")
+    quantity = quantity if colon else "accelerance"
+    if quantity not in POWER_OF_I_OMEGA:
+        hint = did_you_mean(quantity, POWER_OF_I_OMEGA)
+        raise argparse.ArgumentTypeError(f"unknown quantity {quantity!r}; use {', '.join(POWER_OF_I_OMEGA)}{hint}")
+    try:
+        found = float(level)
+    except ValueError:
+        found = -1.0
+    if not 0 < found < math.inf:
+        raise argparse.ArgumentTypeError(f"{word!r} is no floor above zero; give one, such as 0.01 or 2e-9:receptance")
+    return Floor(found, quantity)
+
+
+class FloorArguments(Arguments):
+    """Floors of the noise."""
+
+    floor: list[Annotated[Floor, Form("LEVEL[:QUANTITY]", _floor)]] | None = option(
+        "noise floor, independent of the FRF: of the accelerance in m/(s^2 N), as accelerometers have, or of another "
+        "quantity: 2e-9:receptance (m/N), 1e-6:mobility (m/(s N)); may be repeated"
+    )
+
+
+class NoiseArguments(FloorArguments):
+    """Noise of a fit, and its floors."""
+
+    noise: float | None = option(
+        "relative noise of the FRFs; 0.01 means 1 %; --floor needs it, 0 if no part is relative",
+        "LEVEL",
+        otherwise="estimated from the FRFs",
+    )

@@ -1,31 +1,30 @@
 """Arguments of `jointfrf new`."""
 
-from __future__ import annotations
-
 from pathlib import Path
+from typing import Annotated
 
 from jointfrf.choices import CASE_KINDS
-from jointfrf.workbench.cli.parser import CommandParser, one_of
+from jointfrf.workbench.cli.arguments.declaration import Arguments, Form, flag, one_of, positional
 
-__all__ = ["ASSEMBLY", "STUDY", "add_arguments"]
+__all__ = ["ASSEMBLY", "STUDY", "NewArguments"]
 
 #: A case whose file has a design of factors.
 STUDY = "study"
 #: No case: what `jointfrf identify --model` reads.
 ASSEMBLY = "assembly"
+_KINDS = (*CASE_KINDS, STUDY, ASSEMBLY)
 
 
-def add_arguments(parser: CommandParser) -> None:
-    """Describe the arguments of the command."""
-    parser.description = (
+class NewArguments(Arguments):
+    """Arguments of the command."""
+
+    description = (
         "Write the case.toml of a new case, with a comment for each key, and a JSON Schema for editors. The case runs "
         f"unchanged. KIND is {', '.join(CASE_KINDS)}, or {STUDY}: a case with a design of factors; or {ASSEMBLY}: an "
         "assembly.toml for identify --model."
     )
-    parser.examples.append("jointfrf new known-joint my-case")
-    kinds = (*CASE_KINDS, STUDY, ASSEMBLY)
-    parser.add_argument("kind", metavar="KIND", choices=kinds, type=one_of(kinds), help="kind of the case")
-    parser.add_argument(
-        "folder", nargs="?", type=Path, metavar="FOLDER", help="new folder of the case (default: my-KIND)"
-    )
-    parser.option("--schema", "print the JSON Schema of case.toml instead")
+    examples = ("jointfrf new known-joint my-case",)
+
+    kind: Annotated[str, Form("KIND", one_of(_KINDS), choices=_KINDS)] = positional("kind of the case", "KIND")
+    folder: Path | None = positional("new folder of the case (default: my-KIND)", "FOLDER", optional=True)
+    schema: bool = flag("print the JSON Schema of case.toml instead")

@@ -1,22 +1,27 @@
 """Arguments of `jointfrf run`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
-from jointfrf.workbench.cli.parser import CommandParser
-from jointfrf.workbench.cli.usage import positive
+from jointfrf.workbench.cli.arguments.declaration import Arguments, flag, option, positional
+from jointfrf.workbench.cli.arguments.words import Count, NewFolder
 
-__all__ = ["add_arguments"]
+__all__ = ["RunArguments", "RunOneArguments"]
 
 
-def add_arguments(parser: CommandParser) -> None:
-    """Describe the arguments of the command."""
-    parser.description = "Run cases by name, number or folder; without any, all cases that come with jointfrf."
-    parser.examples.append("jointfrf run 3.1 --realisations 20 --out results")
-    parser.add_argument("cases", nargs="*", metavar="CASE", help="name, number, or folder with a case.toml")
-    parser.option("--out DIR", "folder for the results", Path, Path("results"))
-    parser.option("--realisations N", "number of realisations", positive, otherwise="the number in the case")
-    parser.option("--at-most N", "largest number of realisations of a case", positive)
-    parser.option("--png", "write figures as PNG files, too")
-    parser.option("--jobs N", "number of processes", positive, otherwise="all cores")
+class RunOneArguments(Arguments):
+    """Keywords of `jointfrf.workbench.cases.catalogue.run_case`."""
+
+    realisations: Count | None = option("number of realisations", otherwise="the number in the case")
+    at_most: Count | None = option("largest number of realisations of a case")
+    png: bool = flag("write figures as PNG files, too")
+
+
+class RunArguments(RunOneArguments):
+    """Arguments of the command."""
+
+    description = "Run cases by name, number or folder; without any, all cases that come with jointfrf."
+    examples = ("jointfrf run 3.1 --realisations 20 --out results",)
+
+    cases: list[str] = positional("name, number, or folder with a case.toml", "CASE", optional=True)
+    out: NewFolder = option("folder for the results", default=Path("results"))
+    jobs: Count | None = option("number of processes", otherwise="all cores")
