@@ -10,7 +10,7 @@ from jointfrf.workbench.cases.catalogue import list_cases, numbered, read_case
 from jointfrf.workbench.cases.known_joint.figures import build_figures
 from jointfrf.workbench.cases.known_joint.keys import KnownJointCase
 from jointfrf.workbench.cases.known_joint.tables import build_summary, build_tables
-from jointfrf.workbench.report.document import Page, make_document
+from jointfrf.workbench.report.document import Document, Picture, Section, make_document
 from jointfrf.workbench.report.draw import STYLES, draw, shortened
 from jointfrf.workbench.report.figure import Curve, Figure, Interval, Panel
 from jointfrf.workbench.report.receptance import PHASE, phase_degrees
@@ -170,7 +170,7 @@ def test_a_short_drawing_has_the_same_lines():
 def test_the_verdict_is_the_first_column_wherever_a_table_is_shown(result):
     tables = build_tables(result)
     summary = build_summary(result, tables)
-    text = make_document(Page("", "", summary, tables, []).document)
+    text = make_document(Document("", "", [Section("tables", "Tables", [*summary, *tables])]))
     judged = [table for table in (*summary, *tables) if "" in table.columns]
     regions = "section-3-2-figures-3-11-and-3-12"
     assert [table.key for table in judged] == ["agreement", "table-3-2", regions, "natural-frequencies", "noise-free"]
@@ -197,8 +197,8 @@ def test_the_summary_counts_verdicts(result):
 
 def test_a_page_fits_on_any_screen(result, figures):
     tables = build_tables(result)
-    some = [(figure, draw(figure)) for figure in figures[:1]]
-    text = make_document(Page("", "", build_summary(result, tables), tables, some).document)
+    parts = [*build_summary(result, tables), *tables, Picture(figures[0], draw(figures[0]))]
+    text = make_document(Document("", "", [Section("all", "All", parts)]))
     style = text.split("<style>")[1].split("</style>")[0]
     assert not re.search(r"overflow(-x)?:\s*(auto|scroll)|[^-]width:\s*\d+(px|pt|cm)", style)
     assert text.count('src="data:image/svg+xml,') == 1
@@ -215,5 +215,5 @@ def test_a_table_of_many_columns_is_turned_on_a_page():
     assert turned(wide).columns == ("by, from", "A, x", "B, x")
     assert turned(wide).rows == tuple((name, float(i), float(i)) for i, name in enumerate(names))
     assert turned(wide).percentages == ("A, x", "B, x")
-    body = make_document(Page("", "", [], [wide], []).document).split("<tbody>")[1]
+    body = make_document(Document("", "", [Section("tables", "Tables", [wide])])).split("<tbody>")[1]
     assert body.count("<tr") == 14

@@ -13,7 +13,6 @@ from typing import get_args
 import numpy as np
 
 from jointfrf.dofs import ParameterKind, is_rotation, parameter_name, point_and_direction
-from jointfrf.files import write_file
 from jointfrf.frf.calibration import shows_calibration
 from jointfrf.identification.fit_cards import cards
 from jointfrf.identification.fit_data import FitData, ModelData
@@ -30,8 +29,8 @@ from jointfrf.workbench.report.document import (
     Section,
     Sketch,
     Words,
-    make_document,
     words_of_findings,
+    write_document,
 )
 from jointfrf.workbench.report.figure import Figure
 from jointfrf.workbench.report.fit import fit_figures, information_figure, information_table, shown_name
@@ -142,8 +141,7 @@ def write_report(
     check_type("parts", parts, Sequence)
     for part in parts:
         check_type("parts", part, SketchedPart)
-    write_file(Path(path), make_document(fit_document(fit, ReportOptions(source, command, nodes, parts))))
-    return Path(path)
+    return write_document(fit_document(fit, ReportOptions(source, command, nodes, parts)), path)
 
 
 def fit_document(fit: Fit, options: ReportOptions) -> Document:

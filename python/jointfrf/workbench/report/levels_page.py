@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from jointfrf.dofs import is_rotation
-from jointfrf.files import write_file
 from jointfrf.kernel.arguments import check_type
 from jointfrf.workbench.amplitude.decay import ModalDecay
 from jointfrf.workbench.amplitude.levels import JointLevel, JointLevels
@@ -20,13 +17,13 @@ from jointfrf.workbench.report.document import (
     Picture,
     Section,
     Words,
-    make_document,
     section_of_command,
     words_of_findings,
+    write_document,
 )
 from jointfrf.workbench.report.draw import draw
 from jointfrf.workbench.report.figure import Curve, Figure, Panel, Ribbon
-from jointfrf.workbench.report.table import Table, csv_cell
+from jointfrf.workbench.report.table import Table, csv_text
 
 __all__ = ["levels_csv", "levels_figure", "write_levels"]
 
@@ -105,8 +102,7 @@ def write_levels(found: JointLevels, path: Path | str, *, command: str = "", mod
     ]
     count = max(map(len, found.levels.values()))
     about = f"Stiffness and loss factor of {', '.join(found.levels)} over the amplitude of the motion in the joint."
-    write_file(Path(path), make_document(Document(f"A joint at {count} levels", about, sections)))
-    return Path(path)
+    return write_document(Document(f"A joint at {count} levels", about, sections), path)
 
 
 def _sentences(found: JointLevels) -> Iterator[str]:
@@ -154,10 +150,6 @@ def _row(one: JointLevel) -> tuple[str | float, ...]:
 
 def levels_csv(found: JointLevels) -> str:
     """Write a line for each level of each DOF: a table of secant stiffness and loss factor."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("dof", "test", "amplitude", "lowest", "highest", "force", "k", "k_low", "k_high", "loss_factor",
-                     "loss_factor_low", "loss_factor_high", "order"))  # fmt: skip
-    for dof, own in found.levels.items():
-        writer.writerows(map(csv_cell, (dof, *_row(one))) for one in own)
-    return text.getvalue()
+    columns = ("dof", "test", "amplitude", "lowest", "highest", "force", "k", "k_low", "k_high", "loss_factor",
+               "loss_factor_low", "loss_factor_high", "order")  # fmt: skip
+    return csv_text([columns, *((dof, *_row(one)) for dof, own in found.levels.items() for one in own)])

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from jointfrf.dofs import Parameter
-from jointfrf.files import write_file
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.workbench.planning.joint_frfs import JointFrfPlan
 from jointfrf.workbench.planning.plan import MeasurementPlan
@@ -19,9 +18,9 @@ from jointfrf.workbench.report.document import (
     Picture,
     Section,
     Words,
-    make_document,
     section_of_command,
     words_of_findings,
+    write_document,
 )
 from jointfrf.workbench.report.draw import draw
 from jointfrf.workbench.report.figure import Curve, Figure, Level, Panel
@@ -88,8 +87,7 @@ def write_plan(
     if not isinstance(plan, MeasurementPlan | JointFrfPlan):
         raise TypeError(f"plan must be a MeasurementPlan or a JointFrfPlan, not {type(plan).__name__}")
     document = _of_joint_frfs(plan, command) if isinstance(plan, JointFrfPlan) else _document(plan, parts, command)
-    write_file(Path(path), make_document(document))
-    return Path(path)
+    return write_document(document, path)
 
 
 def _of_joint_frfs(plan: JointFrfPlan, command: str) -> Document:
