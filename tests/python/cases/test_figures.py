@@ -11,7 +11,7 @@ from jointfrf.workbench.cases.known_joint.figures import build_figures
 from jointfrf.workbench.cases.known_joint.keys import KnownJointCase
 from jointfrf.workbench.cases.known_joint.tables import build_summary, build_tables
 from jointfrf.workbench.report.document import Document, Picture, Section, make_document
-from jointfrf.workbench.report.draw import STYLES, draw, shortened
+from jointfrf.workbench.report.draw import STYLES, draw, laid_out, shortened
 from jointfrf.workbench.report.figure import Curve, Figure, Interval, Panel
 from jointfrf.workbench.report.receptance import PHASE, phase_degrees
 from jointfrf.workbench.report.table import Table, as_text, shown, table_csv, turned
@@ -154,17 +154,25 @@ def test_an_interval_that_reaches_beyond_the_axis_ends_in_an_arrowhead():
         assert all(found.count(edge) == within.count(edge) + (edge in more) for edge in (left, right))
 
 
-def test_a_short_drawing_has_the_same_lines():
+def test_a_short_drawing_has_the_same_lines_and_texts():
     points = np.random.default_rng(3).uniform(0, 500, (40, 2))
     line = "M " + " \nL ".join(f"{x:.6f} {y:.6f}" for x, y in points)
-    svg = f'<svg><style></style><g id="a">\n <path d="{line} \n" style="fill: none"/>\n</g></svg>'
+    path = f'<path d="{line} \n" style="fill: none"/>'
+    svg = f'<svg><!-- a --><style></style><g id="a">\n {path}\n<text>1.2345</text></g></svg>'
     text = shortened(svg)
     assert len(text) < 0.8 * len(svg)
-    steps = np.array(re.search(r'd="m([^"]*)"', text)[1].split(), float).reshape(-1, 2)
-    np.testing.assert_allclose(np.cumsum(steps, axis=0), points, atol=0.0051)
-    # What is no line of straight pieces stays.
-    curve = '<path d="M 0 0 C 1.2345 2 3 4 5 6"/>'
-    assert shortened(curve) == curve
+    found = np.array(re.findall(r"[\d.]+", re.search(r' d="([^"]*)"', text)[1]), float).reshape(-1, 2)
+    np.testing.assert_allclose(found, points, atol=0.0051)
+    assert text.endswith("><text>1.2345</text></g></svg>")
+
+
+def test_numbers_along_an_axis_follow_its_limits():
+    panel = Panel("", "x, m", "k, N/m", (Curve("c", X, 1e6 * X, "actual"),))
+    (ax,) = laid_out(Figure("f", "", (panel,))).axes
+    assert [text.get_text() for text in ax.get_yticklabels()] == ["0.0", "2.5", "5.0", "7.5", "10.0"]
+    ax.set_ylim(0, 4e4)
+    assert [text.get_text() for text in ax.get_yticklabels()] == ["0", "10", "20", "30", "40"]
+    assert ax.get_ylabel() == "k, kN/m"
 
 
 def test_the_verdict_is_the_first_column_wherever_a_table_is_shown(result):

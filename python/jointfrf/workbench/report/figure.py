@@ -85,6 +85,11 @@ class Surface:
     label: str = ""
     edges: FloatArray | None = None
 
+    @property
+    def in_space(self) -> bool:
+        """Whether corners have three coordinates."""
+        return bool(self.faces.shape[2] == 3)
+
 
 @dataclass(frozen=True)
 class Panel:
