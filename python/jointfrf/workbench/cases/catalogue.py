@@ -338,9 +338,7 @@ def _sections(
 def write_results(folder: OwnFolder, document: Document, tables: Sequence[Table], content: Mapping[str, Any]) -> Path:
     """Write a page and, beside it, its figures, tables and numbers; return the path of the page."""
     drawings, numbers = (folder / "figures").make(), (folder / "tables").make()
-    for figure, (png, svg) in (
-        part for section in document.sections for part in section.parts if isinstance(part, Picture)
-    ):
+    for figure, (png, svg) in (part for part in document.parts if isinstance(part, Picture)):
         for suffix, text in ((".png", png), (".svg", svg), (".csv", figure_csv(figure))):
             if text:
                 drawings.write(clean_name(figure.key, suffix), text)

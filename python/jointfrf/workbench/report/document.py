@@ -21,7 +21,7 @@ from jointfrf.kernel.arguments import FloatArray
 from jointfrf.messages.finding import Finding, worst_first
 from jointfrf.spelling import visible
 from jointfrf.workbench.report.chart import Chart, chart_view, style_rules
-from jointfrf.workbench.report.draw import Drawing
+from jointfrf.workbench.report.draw import Drawing, draw
 from jointfrf.workbench.report.figure import Figure
 from jointfrf.workbench.report.table import VERDICT, Table, shown, turned, without_repeats, written
 
@@ -61,7 +61,7 @@ class Words:
 
 
 class Picture(NamedTuple):
-    """A figure as it is drawn: its SVG file becomes part of the page."""
+    """A figure that is drawn already: its SVG file becomes part of the page. A `Figure` is drawn for its page."""
 
     figure: Figure
     drawing: Drawing
@@ -112,22 +112,25 @@ class Listing:
     printed: bool = False
 
 
-Part = Table | Words | Picture | Chart | Sketch | HeatMap | Listing
+Part = Table | Words | Figure | Picture | Chart | Sketch | HeatMap | Listing
 
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what follows it; `more` are parts shown when the reader asks for them, under a name."""
+    """A heading and what follows it; `more` are parts shown when the reader asks for them, under a name.
+
+    A part that is None, or a table or text without content, is left out.
+    """
 
     key: str
     heading: str
-    parts: Sequence[Part]
+    parts: Sequence[Part | None]
     more: tuple[str, Sequence[Part]] = ("", ())
 
 
 @dataclass(frozen=True)
 class Document:
-    """The content of a page; tables, texts and sections without content are left out."""
+    """The content of a page; sections without content are left out."""
 
     title: str
     about: str
@@ -137,10 +140,15 @@ class Document:
         kept = [replace(one, parts=[part for part in one.parts if not _is_empty(part)]) for one in self.sections]
         object.__setattr__(self, "sections", [one for one in kept if one.parts])
 
+    @property
+    def parts(self) -> list[Part]:
+        """All parts of all sections."""
+        return [part for one in self.sections for part in (*one.parts, *one.more[1]) if part is not None]
 
-def _is_empty(part: Part) -> bool:
+
+def _is_empty(part: Part | None) -> bool:
     content = {Table: "rows", Words: "sentences", Listing: "text"}.get(type(part))
-    return content is not None and not getattr(part, content)
+    return part is None or (content is not None and not getattr(part, content))
 
 
 def section_of_command(command: str) -> Section:
@@ -213,8 +221,7 @@ def make_document(document: Document) -> str:
     import jinja2
     from markupsafe import Markup
 
-    parts = [part for section in document.sections for part in (*section.parts, *section.more[1])]
-    charts = [part for part in parts if isinstance(part, Chart)]
+    charts = [part for part in document.parts if isinstance(part, Chart)]
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_FOLDER), autoescape=True, undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True, finalize=_seen,
@@ -226,13 +233,13 @@ def make_document(document: Document) -> str:
         policy=_policy(script),
         version=version("jointfrf"),
         verdict=VERDICT,
-        style=Markup(_style(parts, charts)),
+        style=Markup(_style(document.parts, charts)),
         script=Markup(script),
         sections=[
             {
                 "key": section.key,
                 "heading": section.heading,
-                "parts": [_view(part) for part in section.parts],
+                "parts": [_view(part) for part in section.parts if part is not None],
                 "more": section.more[0],
                 "hidden": [_view(part) for part in section.more[1]],
             }
@@ -273,6 +280,8 @@ def _style(parts: Sequence[Part], charts: Sequence[Chart]) -> str:
 def _view(part: Part) -> dict[str, Any]:
     """Return what the template shows of a part; `kind` names its macro."""
     shown: dict[str, Any] = {}
+    if isinstance(part, Figure):
+        part = Picture(part, draw(part, png=False))
     if isinstance(part, Table):
         shown = _table_view(part)
     elif isinstance(part, Picture):

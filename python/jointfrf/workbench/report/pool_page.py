@@ -11,14 +11,12 @@ from jointfrf.workbench.pooling.pool import PooledFits, place_of
 from jointfrf.workbench.report.axes import prefixed_unit
 from jointfrf.workbench.report.document import (
     Document,
-    Picture,
     Section,
     Words,
     section_of_command,
     words_of_findings,
     write_document,
 )
-from jointfrf.workbench.report.draw import draw
 from jointfrf.workbench.report.figure import Figure, Interval, Level, Panel
 from jointfrf.workbench.report.table import Table, csv_text, without_repeats
 
@@ -82,7 +80,7 @@ def _document(pooled: PooledFits, command: str) -> Document:
     figures = [forest_figure(one, pooled.probability) for one in pooled.parameters.values()]
     sections = [
         Section("summary", "Summary", [Words(list(_sentences(pooled))), *words_of_findings(pooled.findings)]),
-        Section("forest", "Fits, mean, and the next assembly", [Picture(one, draw(one)) for one in figures]),
+        Section("forest", "Fits, mean, and the next assembly", figures),
         Section("tables", "Tables", [_mean_table(pooled), _spread_table(pooled), _trend_table(pooled)]),
         section_of_command(command),
     ]
