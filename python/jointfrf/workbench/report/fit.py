@@ -25,10 +25,10 @@ from jointfrf.laws.law_joint import LawJoint
 from jointfrf.workbench.report.axes import FREQUENCY, bulk_limits
 from jointfrf.workbench.report.draw import draw, laid_out
 from jointfrf.workbench.report.figure import Curve, Figure, Panel, Ribbon
-from jointfrf.workbench.report.fit_frfs import compare_frfs, compare_model, frf_figures
+from jointfrf.workbench.report.fit_frfs import compare_fit, frf_figures
 from jointfrf.workbench.report.table import Cell, Table
 
-__all__ = ["fit_figures", "fit_overview", "information_figure", "information_table", "plot", "shown_name", "write_fit"]
+__all__ = ["fit_figures", "fit_information", "fit_overview", "plot", "shown_name", "write_fit"]
 
 
 def fit_figures(fit: Fit) -> list[Figure]:
@@ -244,17 +244,20 @@ def shown_name(one: FittedParameter) -> Cell:
     return Parameter(cast(ParameterKind, one.kind), one.row, one.column) if is_spring else one.name
 
 
-def information_table(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Table:
-    """Return for each parameter below which frequency a tenth, half and nine tenths of the information lie.
+def fit_information(fit: Fit) -> tuple[Figure | None, Table | None]:
+    """Return where in frequency the information on each parameter lies, for a fit of FRFs between all joint DOFs.
 
-    Parameters
-    ----------
-    fit : Fit
-    freq_hz : ndarray, shape (n_freq,)
-        Rising, Hz.
-    shares : ndarray, shape (n_freq, p)
-        Share of each line.
+    Returns
+    -------
+    figure : Figure or None
+        Share of each part of the band; None for few lines.
+    table : Table or None
+        Frequencies below which a tenth, half and nine tenths lie.
     """
+    if not isinstance(fit.data, FitData):
+        return None, None
+    up = np.argsort(fit.freq_hz, kind="stable")
+    freq_hz, shares = fit.freq_hz[up], fit.data.information()[up]
     total = np.cumsum(shares, axis=0)
     rows: list[tuple[Cell, ...]] = []
     for i, term in enumerate(fit.parameters):
@@ -262,10 +265,11 @@ def information_table(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Tabl
         rows.append((shown_name(term), *(float(freq_hz[a]) for a in at)))
     columns = ("parameter", *(f"{100 * q:.0f} % below, Hz" for q in _QUANTILES))
     note = "Eight tenths of what the data say of a parameter lie between the first and the last frequency."
-    return Table("information-table", "Where the information lies", columns, tuple(rows), note=note)
+    table = Table("information-table", "Where the information lies", columns, tuple(rows), note=note)
+    return _information_figure(fit, freq_hz, shares), table
 
 
-def information_figure(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Figure | None:
+def _information_figure(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Figure | None:
     """Draw the share of each part of the band in what is known of the parameters of each DOF; None for few lines."""
     parts = min(_PARTS, freq_hz.size // _LEAST)
     if parts < 3 or freq_hz[-1] == freq_hz[0]:
@@ -304,9 +308,7 @@ def fit_overview(fit: Fit) -> Figure:
         titles = (f"DOF {dof}: joint stiffness", "", f"DOF {dof}: joint compliance", "")
         panels += [replace(panel, title=title) for panel, title in zip(figure.panels, titles, strict=True)]
     if fit.data is not None:
-        up = np.argsort(fit.freq_hz, kind="stable")
-        compared = compare_frfs(fit.data, fit.dofs) if isinstance(fit.data, FitData) else compare_model(fit)
-        frfs = frf_figures(compared, fit.freq_hz, up)[:_FRFS]
+        frfs = frf_figures(compare_fit(fit), fit.freq_hz)[:_FRFS]
         for first in range(0, len(frfs), 2):
             beside = frfs[first : first + 2]
             for part in zip(*(figure.panels for figure in beside), strict=True):

@@ -18,7 +18,7 @@ from jointfrf.workbench.report.document import HeatMap
 from jointfrf.workbench.report.figure import Curve, Figure
 from jointfrf.workbench.report.receptance import ReceptanceCurve, receptance_panels
 
-__all__ = ["ComparedFrfs", "compare_frfs", "compare_model", "frf_figures", "reciprocity_map", "residual_map"]
+__all__ = ["ComparedFrfs", "compare_fit", "frf_figures", "reciprocity_map", "residual_map"]
 
 #: FRFs that are drawn at most.
 _MOST = 24
@@ -75,7 +75,12 @@ class ComparedFrfs:
         return int(np.argmax(np.where(np.isfinite(left), left, -1.0)))
 
 
-def compare_frfs(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
+def compare_fit(fit: Fit) -> ComparedFrfs:
+    """Compare the FRFs of a fit with those that the joint found, with the models if there are any, predicts."""
+    return _compare_joint(fit.data, fit.dofs) if isinstance(fit.data, FitData) else _compare_model(fit)
+
+
+def _compare_joint(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
     """Regenerate the FRFs of a fit, a piece of the lines at a time, and compare them with the measured ones."""
     same = data.responses.shape == data.forces.shape and np.array_equal(data.responses, data.forces)
     modes = data.modes
@@ -140,7 +145,7 @@ def _above_noise(squares: NDArray[np.floating], variance: NDArray[np.floating]) 
     return np.asarray(loud if loud.any() else known.any(axis=0), np.bool_)
 
 
-def compare_model(fit: Fit) -> ComparedFrfs:
+def _compare_model(fit: Fit) -> ComparedFrfs:
     """Compare the FRFs of a fit of an assembly with those that its models and the joint predict."""
     data = fit.data
     assert isinstance(data, ModelData)
@@ -195,9 +200,9 @@ def _evenly(pairs: Sequence[tuple[int, int]], most: int) -> list[tuple[int, int]
     return [pairs[round(i * (len(pairs) - 1) / max(count - 1, 1))] for i in range(count)]
 
 
-def frf_figures(compared: ComparedFrfs, freq_hz: FloatArray, up: NDArray[np.intp]) -> list[Figure]:
-    """Return modulus and phase of each FRF that is drawn; `up` puts the lines in rising order."""
-    figures = []
+def frf_figures(compared: ComparedFrfs, freq_hz: FloatArray) -> list[Figure]:
+    """Return modulus and phase of each FRF that is drawn."""
+    figures, up = [], np.argsort(freq_hz, kind="stable")
     for i, (p, q) in enumerate(compared.entries):
         names = (compared.rows[p], compared.columns[q])
         ends = [name.rpartition(":")[2].lstrip("+-") for name in names]
@@ -225,6 +230,13 @@ def _limits(curves: tuple[Curve, ...], difference: FloatArray) -> tuple[float, f
     return low / 1.5, 1.5 * float(values.max())
 
 
+def _map(compared: ComparedFrfs, key: str, title: str, values: FloatArray, note: str) -> HeatMap:
+    return HeatMap(
+        key, f"{title}, in units of the noise", "response \\ force", compared.rows, compared.columns, values, _LIGHT,
+        _DARK, note, log=True,
+    )  # fmt: skip
+
+
 def residual_map(compared: ComparedFrfs) -> HeatMap:
     """Return the map of what is left by response and force."""
     where = "channel" if compared.of_channels else "joint DOF"
@@ -234,20 +246,14 @@ def residual_map(compared: ComparedFrfs) -> HeatMap:
             "1 is noise. A row or a column well above 1 is a channel that does not fit: gain, place, direction, or a "
             "part of the model near it."
         )
-        return HeatMap(
-            "residual-map", "Residual by channel, in units of the noise", "response \\ force", compared.rows,
-            compared.columns, compared.residual, _LIGHT, _DARK, note, log=True,
-        )  # fmt: skip
-    note = (
-        "Root mean square of measured minus regenerated over the lines used, in units of the noise of the FRF, or of "
-        "rigid motion there if that has more. About 1 or below is noise. A row and a column well above 1 are a channel "
-        "that does not fit (gain, place, direction); the rows and columns of a side, one whose channels do not move "
-        "as a rigid body."
-    )
-    return HeatMap(
-        "residual-map", f"Residual by {where}, in units of the noise", "response \\ force", compared.rows,
-        compared.columns, compared.residual, _LIGHT, _DARK, note, log=True,
-    )  # fmt: skip
+    else:
+        note = (
+            "Root mean square of measured minus regenerated over the lines used, in units of the noise of the FRF, or "
+            "of rigid motion there if that has more. About 1 or below is noise. A row and a column well above 1 are a "
+            "channel that does not fit (gain, place, direction); the rows and columns of a side, one whose channels do "
+            "not move as a rigid body."
+        )
+    return _map(compared, "residual-map", f"Residual by {where}", compared.residual, note)
 
 
 def reciprocity_map(compared: ComparedFrfs) -> HeatMap | None:
@@ -258,7 +264,4 @@ def reciprocity_map(compared: ComparedFrfs) -> HeatMap | None:
         "Root mean square of h_pq - h_qp in units of its noise: 1 is noise. A row well above 1 is a response and a "
         "force that are not at one place or in one direction."
     )
-    return HeatMap(
-        "reciprocity-map", "Reciprocity, in units of the noise", "response \\ force", compared.rows, compared.columns,
-        compared.reciprocity, _LIGHT, _DARK, note, log=True,
-    )  # fmt: skip
+    return _map(compared, "reciprocity-map", "Reciprocity", compared.reciprocity, note)
