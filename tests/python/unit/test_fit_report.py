@@ -21,7 +21,7 @@ from jointfrf.workbench.report.fit import fit_figures
 from jointfrf.workbench.report.fit_frfs import compare_fit
 from jointfrf.workbench.report.fit_page import ReportOptions, fit_document
 from jointfrf.workbench.report.fit_words import finding_sentences, parameter_table, quality_sentences
-from jointfrf.workbench.report.sketch import _names, interface_points, interface_sketch, point_table
+from jointfrf.workbench.report.sketch import interface_points, interface_sketch, point_table
 from jointfrf.workbench.report.table import written
 
 
@@ -312,7 +312,9 @@ def test_names_in_a_sketch_overprint_neither_each_other_nor_points(count):
     for i, a in enumerate(boxes):
         for b in (*boxes[i + 1 :], *circles):
             assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1], (a, b)
-    assert "<tip>" not in _names({"<tip>": (100.0, 100.0)}, [], 200.0)[0]
+    named = interface_sketch(sides, [points[0]._replace(name="<tip>"), *points[1:]], sides.dofs)
+    assert "&lt;tip&gt;" in named.svg
+    assert "<tip>" not in named.svg
 
 
 def test_the_table_of_points_has_no_coordinate_that_nobody_measured():
