@@ -126,3 +126,10 @@ def test_a_fit_goes_to_another_process_and_answers_there_as_here(fit):
     assert there.confidence_interval(0.95) == fit.confidence_interval(0.95)
     assert there.derived("c_y / k_y") == fit.derived("c_y / k_y")
     assert there.data.next_channels() == fit.data.next_channels()
+
+
+def test_axes_of_a_joint_without_lines_of_its_own_fit_what_was_found(fit):
+    loss = fit_figures(fit)[1].panels[3]
+    (curve,) = loss.curves
+    assert loss.y_label == "Im C, rad/(N m)"
+    assert np.ptp(loss.y_limits) == pytest.approx(1.3 * np.ptp(curve.y))
