@@ -215,11 +215,14 @@ def thinned_line(y: FloatArray, most: int) -> NDArray[np.intp]:
     """
     if y.size <= most:
         return np.arange(y.size)
-    starts = _columns(y.size, max(most // 2, 1))
-    finite = np.isfinite(y)
-    lowest = _first_where(y, np.minimum.reduceat(np.where(finite, y, np.inf), starts), starts)
-    highest = _first_where(y, np.maximum.reduceat(np.where(finite, y, -np.inf), starts), starts)
-    return np.unique(np.concatenate([lowest, highest]))
+    width = int(np.ceil(y.size / max(most // 2, 1)))
+    starts = np.arange(0, y.size, width)
+    columns = np.full((starts.size, width), np.nan)
+    columns.flat[: y.size] = y
+    finite = np.isfinite(columns)
+    lowest = np.where(finite, columns, np.inf).argmin(axis=1)
+    highest = np.where(finite, columns, -np.inf).argmax(axis=1)
+    return np.unique(np.concatenate([starts + lowest, starts + highest]))
 
 
 def thinned_dots(y: FloatArray, most: int) -> NDArray[np.intp]:
@@ -239,17 +242,3 @@ def thinned_dots(y: FloatArray, most: int) -> NDArray[np.intp]:
     columns = max(most // _DOTS, 1)
     evenly = np.linspace(0, y.size - 1, (_DOTS - 2) * columns).astype(np.intp)
     return np.unique(np.concatenate([thinned_line(y, 2 * columns), evenly]))
-
-
-def _columns(size: int, count: int) -> NDArray[np.intp]:
-    return np.linspace(0, size, count, endpoint=False).astype(np.intp)
-
-
-def _first_where(y: FloatArray, value: FloatArray, starts: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the first place in each column that holds its value; its first place where it holds none."""
-    column = np.repeat(np.arange(starts.size), np.diff(np.append(starts, y.size)))
-    hit = np.flatnonzero(y == value[column])
-    found = starts.copy()
-    own, first = np.unique(column[hit], return_index=True)
-    found[own] = hit[first]
-    return found

@@ -221,11 +221,11 @@ def make_document(document: Document) -> str:
     import jinja2
     from markupsafe import Markup
 
-    charts = [part for part in document.parts if isinstance(part, Chart)]
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_FOLDER), autoescape=True, undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True, finalize=_seen,
     )  # fmt: skip
+    charts = [part for part in document.parts if isinstance(part, Chart)]
     script = (_FOLDER / "chart.js").read_text(encoding="utf-8") if charts else ""
     script = script.replace("\r\n", "\n").replace("\r", "\n")  # as a browser reads it, whose checksum must be the same
     return environment.get_template("page.html.jinja").render(
@@ -235,16 +235,7 @@ def make_document(document: Document) -> str:
         verdict=VERDICT,
         style=Markup(_style(document.parts, charts)),
         script=Markup(script),
-        sections=[
-            {
-                "key": section.key,
-                "heading": section.heading,
-                "parts": [_view(part) for part in section.parts if part is not None],
-                "more": section.more[0],
-                "hidden": [_view(part) for part in section.more[1]],
-            }
-            for section in document.sections
-        ],
+        views=lambda parts: [_view(part) for part in parts],
     )
 
 
