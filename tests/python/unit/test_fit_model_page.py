@@ -8,16 +8,9 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.workbench.report.fit import fit_figures
-from jointfrf.workbench.report.fit_model import (
-    assurance,
-    assurance_map,
-    band_map,
-    is_wide,
-    next_parts,
-    next_sentences,
-    unknowns_table,
-)
+from jointfrf.workbench.report.fit_frfs import assurance, assurance_map, band_map
 from jointfrf.workbench.report.fit_page import ReportOptions, fit_document
+from jointfrf.workbench.report.fit_words import is_wide, next_parts, next_sentences, unknowns_table
 
 FREQ = np.arange(15.0, 801.0, 8.0)
 SECTION = {"density": 2700.0, "width": 0.025, "height": 0.006, "loss_factor": 0.01}

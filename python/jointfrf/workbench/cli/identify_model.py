@@ -28,8 +28,8 @@ from jointfrf.workbench.cli.export import CardRequest, card_request, page_nodes,
 from jointfrf.workbench.cli.measured_file import file_names, read_measured, setups_with_gains
 from jointfrf.workbench.cli.noise import stated_noise
 from jointfrf.workbench.cli.usage import Failures, Interrupt, Output, UsageError, listed, waiting
-from jointfrf.workbench.report.fit_model import next_sentences
 from jointfrf.workbench.report.fit_page import write_report
+from jointfrf.workbench.report.fit_words import next_sentences
 
 __all__ = ["run_model"]
 

@@ -9,9 +9,8 @@ chart        a figure as part of a page, which a script zooms
 sketch       the channels around a joint; the parts of an assembly with sensors and hits
 document     one self-contained HTML page from sentences, tables, figures and texts
 fit          figures of an identification and of where its information lies; its files
-fit_frfs     measured FRFs against those regenerated with the joint
-fit_model    agreement and unknowns of a fit of an assembly; what to measure next
-fit_words    what a fit has found, in sentences and tables
+fit_frfs     measured FRFs against those regenerated or predicted; maps of agreement and residual
+fit_words    what a fit has found and what to measure next, in sentences and tables
 fit_page     the page on an identification
 plan_page    a planned test: where sensors and hits go, where the knowledge lies
 levels_page  a joint at several levels, modes of a free decay: curves over amplitude, a page

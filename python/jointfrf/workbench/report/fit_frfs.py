@@ -1,4 +1,4 @@
-"""Measured FRFs against those regenerated with the joint, and maps of what is left, by channel."""
+"""Measured FRFs against those regenerated or predicted with the joint, and maps of agreement and residual."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from jointfrf.workbench.report.document import HeatMap
 from jointfrf.workbench.report.figure import Curve, Figure
 from jointfrf.workbench.report.receptance import ReceptanceCurve, receptance_panels
 
-__all__ = ["ComparedFrfs", "compare_fit", "frf_figures", "reciprocity_map", "residual_map"]
+__all__ = ["ComparedFrfs", "assurance", "compare_fit", "frf_figures", "frf_maps"]
 
 #: FRFs that are drawn at most.
 _MOST = 24
@@ -26,6 +26,10 @@ _MOST = 24
 _NO_NOISE = 1e-9
 #: Values from which on cells of a map are shaded, and of the darkest unless some are larger.
 _LIGHT, _DARK = 1.0, 10.0
+#: Agreement from which on a cell is shaded, and that of the darkest.
+_AGREES, _DIFFERS = 0.95, 0.6
+#: Parts of the band in the map of the residual, and lines that each holds at least.
+_PARTS, _LEAST_LINES = 8, 8
 #: An FRF has signal where its mean square is above so many times that of its noise, which has 1; lines that are asked.
 _SIGNAL, _ASKED = 2.0, 200
 #: Share of the differences that may lie below a panel.
@@ -230,6 +234,13 @@ def _limits(curves: tuple[Curve, ...], difference: FloatArray) -> tuple[float, f
     return low / 1.5, 1.5 * float(values.max())
 
 
+def frf_maps(fit: Fit, compared: ComparedFrfs) -> list[HeatMap]:
+    """Return maps by response and force: residual, and agreement or reciprocity where they are known."""
+    if isinstance(fit.data, ModelData):
+        return [assurance_map(fit), residual_map(compared), band_map(fit)]
+    return [one for one in (residual_map(compared), reciprocity_map(compared)) if one]
+
+
 def _map(compared: ComparedFrfs, key: str, title: str, values: FloatArray, note: str) -> HeatMap:
     return HeatMap(
         key, f"{title}, in units of the noise", "response \\ force", compared.rows, compared.columns, values, _LIGHT,
@@ -265,3 +276,68 @@ def reciprocity_map(compared: ComparedFrfs) -> HeatMap | None:
         "force that are not at one place or in one direction."
     )
     return _map(compared, "reciprocity-map", "Reciprocity", compared.reciprocity, note)
+
+
+def assurance(measured: ComplexArray, predicted: ComplexArray) -> FloatArray:
+    """Return the frequency response assurance criterion of each FRF, shape (n_o, n_i).
+
+    Parameters
+    ----------
+    measured, predicted : ndarray, shape (n_freq, n_o, n_i)
+        NaN where nothing was measured.
+
+    Returns
+    -------
+    ndarray
+        FRAC = |sum m conj(p)|^2 / (sum |m|^2 sum |p|^2) over the lines, from 0 to 1; a constant factor does not change
+        it. NaN where nothing was measured.
+
+    References
+    ----------
+    W. Heylen, S. Lammens, FRAC: a consistent way of comparing frequency response functions, Proc. Int. Conf. on
+    Identification in Engineering Systems, Swansea 1996, 48-57; R. J. Allemang, The modal assurance criterion - twenty
+    years of use and abuse, Sound and Vibration 37 (2003) no. 8, 14-23.
+    """
+    known = np.isfinite(measured) & np.isfinite(predicted)
+    m, p = np.where(known, measured, 0), np.where(known, predicted, 0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found = abs((m * p.conj()).sum(axis=0)) ** 2 / ((abs(m) ** 2).sum(axis=0) * (abs(p) ** 2).sum(axis=0))
+    return np.asarray(found, float)
+
+
+def assurance_map(fit: Fit) -> HeatMap:
+    """Return the map of FRAC by response and force."""
+    data = fit.data
+    assert isinstance(data, ModelData)
+    note = (
+        "Frequency response assurance criterion |Σ m p*|² / (Σ |m|² Σ |p|²) of measured m and predicted p over the "
+        "lines used (Heylen and Lammens 1996): 1 where they differ by a constant factor only. Peaks weigh most."
+    )
+    return HeatMap(
+        "frac-map", "Agreement of each FRF (FRAC)", "response \\ force", fit.responses, fit.forces,
+        assurance(data.measured, data.predicted), _AGREES, _DIFFERS, note, 3,
+    )  # fmt: skip
+
+
+def band_map(fit: Fit) -> HeatMap:
+    """Return the map of the residual by channel and part of the band."""
+    data = fit.data
+    assert isinstance(data, ModelData)
+    up = np.argsort(fit.freq_hz, kind="stable")
+    parts = np.array_split(up, max(1, min(_PARTS, fit.freq_hz.size // _LEAST_LINES)))
+    squares, known = np.nan_to_num(abs(data.residual) ** 2), np.isfinite(data.residual)
+    rows = [*(f"response {name}" for name in fit.responses), *(f"force {name}" for name in fit.forces)]
+    values = []
+    for axis, names in ((2, fit.responses), (1, fit.forces)):
+        for i in range(len(names)):
+            own = [np.take(part.sum(axis=axis), i, axis=1) for part in (squares, known)]
+            with np.errstate(invalid="ignore", divide="ignore"):
+                values.append([float(np.sqrt(own[0][part].sum() / own[1][part].sum())) for part in parts])
+    columns = [f"{fit.freq_hz[part[0]]:.4g}–{fit.freq_hz[part[-1]]:.4g} Hz" for part in parts]
+    note = (
+        "Root mean square in units of the noise. A column well above 1 is a part of the band where the models are off."
+    )
+    return HeatMap(
+        "residual-band-map", "Residual by channel and band, in units of the noise", "channel \\ band", rows, columns,
+        np.array(values), _LIGHT, _DARK, note, log=True,
+    )  # fmt: skip

@@ -32,9 +32,15 @@ from jointfrf.workbench.report.document import (
 )
 from jointfrf.workbench.report.figure import Figure
 from jointfrf.workbench.report.fit import fit_figures, fit_information
-from jointfrf.workbench.report.fit_frfs import ComparedFrfs, compare_fit, frf_figures, reciprocity_map, residual_map
-from jointfrf.workbench.report.fit_model import assurance_map, band_map, next_parts, unknowns_table
-from jointfrf.workbench.report.fit_words import finding_sentences, parameter_table, quality_sentences, seen_table
+from jointfrf.workbench.report.fit_frfs import ComparedFrfs, compare_fit, frf_figures, frf_maps
+from jointfrf.workbench.report.fit_words import (
+    finding_sentences,
+    next_parts,
+    parameter_table,
+    quality_sentences,
+    seen_table,
+    unknowns_table,
+)
 from jointfrf.workbench.report.receptance import noise_figure
 from jointfrf.workbench.report.sketch import (
     SketchedPart,
@@ -149,6 +155,7 @@ def fit_document(fit: Fit, options: ReportOptions) -> Document:
     worst = shown.pop(compared.worst)
     caption = f"{worst.figure.caption}: of the FRFs drawn the one that fits worst"
     known_noise = f"Noise of {100 * fit.noise_level:.2g} % of the FRFs (median) was used; how it varies is not kept."
+    maps = "Agreement and residual" if is_model else "Residual and reciprocity by channel"
     sections = [
         _summary(fit, compared, replace(worst, figure=replace(worst.figure, caption=caption))),
         Section("doubts", "Warnings and notes" if fit.warnings else "Notes", words_of_findings(fit.findings)),
@@ -160,7 +167,7 @@ def fit_document(fit: Fit, options: ReportOptions) -> Document:
             shares,
         ]),
         _frf_section(fit, compared, shown, most),
-        _maps(fit, compared),
+        Section("maps", maps, frf_maps(fit, compared)),
         Section("unknowns", "Unknowns of the models", [unknowns_table(fit)]),
         Section("next", "What to measure next", next_parts(fit)),
         Section("noise", "Noise", [
@@ -300,12 +307,6 @@ def _frf_section(fit: Fit, compared: ComparedFrfs, charts: Sequence[Chart], most
     heading = f"Measured and {'predicted' if is_model else 'regenerated'} FRFs"
     more = (f"{len(charts) - _AT_ONCE} more FRFs", charts[_AT_ONCE:])
     return Section("frfs", heading, [Words(sentences), *charts[:_AT_ONCE]], more)
-
-
-def _maps(fit: Fit, compared: ComparedFrfs) -> Section:
-    if isinstance(fit.data, ModelData):
-        return Section("maps", "Agreement and residual", [assurance_map(fit), residual_map(compared), band_map(fit)])
-    return Section("maps", "Residual and reciprocity by channel", [residual_map(compared), reciprocity_map(compared)])
 
 
 def _noise_figure(fit: Fit) -> Figure | None:

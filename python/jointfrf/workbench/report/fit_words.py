@@ -1,4 +1,4 @@
-"""What a fit has found, in sentences that can be quoted, and as tables."""
+"""What a fit has found and what to measure next, in sentences that can be quoted, and as tables."""
 
 from __future__ import annotations
 
@@ -8,13 +8,23 @@ import numpy as np
 
 from jointfrf.dofs import ParameterKind, is_rotation, parameter_name, point_and_direction
 from jointfrf.identification.fit_data import FitData, ModelData
+from jointfrf.identification.model.next_channels import NextChannel
 from jointfrf.identification.result import UNDETERMINED, Fit, FittedParameter, is_undetermined
 from jointfrf.workbench.report.axes import prefixed_unit
+from jointfrf.workbench.report.document import Part, Words
 from jointfrf.workbench.report.fit import shown_name
 from jointfrf.workbench.report.table import Cell, Table
 
-__all__ = ["finding_sentences", "parameter_table", "quality_sentences", "seen_table"]
+__all__ = ["finding_sentences", "is_wide", "next_parts", "next_sentences", "parameter_table", "quality_sentences",
+           "seen_table", "unknowns_table"]  # fmt: skip
 
+#: An interval whose half is more than this share of a value is wide: designers ask for a stiffness to 10 %.
+_WIDE = 0.1
+#: Unknowns have moved from this many standard deviations of the prior on; the FRFs say little of one whose standard
+#: deviation they leave above this share.
+_MOVED, _UNCHANGED = 1.0, 0.9
+#: Channels that are named, and shares that are printed alike.
+_NAMED, _SAME = 3, 0.01
 #: A residual up to this many times the noise is called that of the noise.
 _NOISE = 1.1
 #: Significant digits of an uncertainty.
@@ -197,3 +207,67 @@ def seen_table(fit: Fit) -> Table:
         "width of the interval of the joint alone."
     )
     return Table("seen", "Stiffness as seen between the virtual points", columns, tuple(rows), note=note)
+
+
+def unknowns_table(fit: Fit) -> Table | None:
+    """Return what the FRFs say of the unknowns beside the joint that have a prior; None where there are none."""
+    errors, rows = fit.std_error, list[tuple[Cell, ...]]()
+    for one in fit.parameters:
+        if one.origin == "joint" or one.prior is None:
+            continue
+        moved, left = (fit.value[one.name] - one.prior[0]) / one.prior[1], errors[one.name] / one.prior[1]
+        says = "known from the prior only" if left > _UNCHANGED else "moved" if abs(moved) > _MOVED else "confirmed"
+        prior = f"{one.prior[0]:.4g} ± {one.prior[1]:.2g}"
+        found = f"{fit.value[one.name]:.5g} ± {errors[one.name]:.2g}"
+        rows.append((one.name, one.unit, prior, found, f"{moved:+.2f}", f"{100 * left:.3g} %", says))
+    if not rows:
+        return None
+    note = "Standard deviations; moved: in those of the prior; left: what the FRFs leave of the prior's."
+    columns = ("unknown", "unit", "prior", "found", "moved", "left", "the FRFs")
+    return Table("unknowns", "Unknowns of the models, before and after", columns, tuple(rows), note=note)
+
+
+def is_wide(fit: Fit) -> bool:
+    """Whether a parameter of the joint has a wide interval."""
+    intervals = fit.confidence_interval(0.95)
+    return any(
+        not intervals[one.name][1] - intervals[one.name][0] < 2 * _WIDE * abs(fit.value[one.name])
+        for one in fit.parameters
+        if one.origin == "joint"
+    )
+
+
+def next_sentences(fit: Fit) -> list[str]:
+    """Say what to measure next where intervals of the joint are wide; nothing where they are not."""
+    data = fit.data
+    if not isinstance(data, ModelData) or not is_wide(fit):
+        return []
+    found = data.next_channels()
+    if not found:
+        return ["No other translation of the models would narrow the widest interval by a tenth; less noise would."]
+    sentences = []
+    of_dof: dict[str, list[NextChannel]] = {}
+    for one in found:
+        of_dof.setdefault(one.dof, []).append(one)
+    for dof, (one, *others) in list(of_dof.items())[:_NAMED]:
+        # FRFs of one drive point are reciprocal: a sensor or a force there give the same.
+        is_either = bool(others) and all(
+            abs(others[0].shares[key] - share) < _SAME for key, share in one.shares.items()
+        )
+        what = "a response or a force" if is_either else f"a {one.kind}"
+        others_of = {name: share for name, share in one.shares.items() if name != one.widest}
+        text = f"{100 * one.shares[one.widest]:.2g} % of that of {one.widest}"
+        if others_of:
+            best = min(others_of, key=others_of.__getitem__)
+            text += f" and {100 * others_of[best]:.2g} % of that of {best}"
+        sentences.append(f"Measure {what} at {dof}: of the standard errors, it would leave {text}.")
+    return sentences
+
+
+def next_parts(fit: Fit) -> list[Part]:
+    """Return what to measure next, where that is asked."""
+    sentences = next_sentences(fit)
+    if not sentences:
+        return []
+    how = "Each by itself, with lines and relative noise of this test, as the models and the joint found predict it."
+    return [Words(sentences), Words([how], "notes")]
