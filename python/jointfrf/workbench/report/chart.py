@@ -16,7 +16,7 @@ from jointfrf.workbench.report.axes import numbered_axis
 from jointfrf.workbench.report.draw import STYLES, Style
 from jointfrf.workbench.report.figure import Curve, Figure, Panel, Ribbon
 
-__all__ = ["Chart", "chart_view", "count_points", "style_rules", "thinned_dots", "thinned_line"]
+__all__ = ["Chart", "chart_view", "style_rules", "thinned_dots", "thinned_line"]
 
 #: Units of the paths along x and y: what a screen cannot show at full width may still be seen when zoomed in.
 _WIDE, _HIGH = 20000, 8000
@@ -39,11 +39,6 @@ class Chart:
     figure: Figure
     alt: str
     most: int = 4000
-
-
-def count_points(figures: Iterable[Figure]) -> list[int]:
-    """Return the number of points of every curve of figures."""
-    return [curve.x.size for figure in figures for panel in figure.panels for curve in panel.curves]
 
 
 def chart_view(chart: Chart) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from jointfrf.io.card_link import CardFormat
 from jointfrf.kernel.arguments import FloatArray, check_type
 from jointfrf.kernel.call import get_engine
 from jointfrf.workbench.report.axes import bands_in_words
-from jointfrf.workbench.report.chart import Chart, count_points
+from jointfrf.workbench.report.chart import Chart
 from jointfrf.workbench.report.document import (
     Document,
     Listing,
@@ -145,7 +145,8 @@ def fit_document(fit: Fit, options: ReportOptions) -> Document:
     is_model, compared = isinstance(data, ModelData), compare_fit(fit)
     frfs, joint = frf_figures(compared, fit.freq_hz), fit_figures(fit)
     (information, shares), noise = fit_information(fit), _noise_figure(fit)
-    most = _most_points([*frfs, *joint, *(one for one in (information, noise) if one)])
+    figures = [one for one in (*frfs, *joint, information, noise) if one]
+    most = max(_LEAST, _POINTS // sum(len(panel.curves) for figure in figures for panel in figure.panels))
 
     def charts(figures: Iterable[Figure | None], what: str) -> list[Chart]:
         what = f"{what}, {fit.freq_hz.min():g} to {fit.freq_hz.max():g} Hz"
@@ -198,16 +199,6 @@ def _span(freq_hz: FloatArray) -> str:
     if freq_hz.size == 1:
         return f"one frequency line, {freq_hz[0]:g} Hz"
     return f"{freq_hz.size} frequency lines from {freq_hz.min():g} to {freq_hz.max():g} Hz"
-
-
-def _most_points(figures: Iterable[Figure]) -> int:
-    """Return how many points a curve may have so that the page stays small."""
-    counts = np.sort(np.array(count_points(figures)))
-    for done, size in enumerate(counts):
-        rest = counts.size - done
-        if counts[:done].sum() + rest * size > _POINTS:
-            return max(_LEAST, int((_POINTS - counts[:done].sum()) / rest))
-    return int(counts[-1])
 
 
 def _summary(fit: Fit, compared: ComparedFrfs, first: Part) -> Section:
