@@ -13,8 +13,6 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = [
     "FREQUENCY",
-    "NumberedAxis",
-    "axis_values",
     "bands_in_words",
     "bulk_limits",
     "format_axis",
@@ -26,8 +24,6 @@ __all__ = [
     "percentiles",
     "prefixed_unit",
     "symbol",
-    "tick_texts",
-    "value_text",
 ]
 
 #: SI prefixes by powers of ten.

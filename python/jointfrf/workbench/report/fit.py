@@ -28,7 +28,7 @@ from jointfrf.workbench.report.figure import Curve, Figure, Panel, Ribbon
 from jointfrf.workbench.report.fit_frfs import compare_fit, frf_figures
 from jointfrf.workbench.report.table import Cell, Table
 
-__all__ = ["fit_figures", "fit_information", "fit_overview", "plot", "shown_name", "write_fit"]
+__all__ = ["fit_figures", "fit_information", "plot", "shown_name", "write_fit"]
 
 
 def fit_figures(fit: Fit) -> list[Figure]:
@@ -273,26 +273,6 @@ def _information_figure(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Fi
 _FRFS = 4
 
 
-def fit_overview(fit: Fit) -> Figure:
-    """Return K* and compliance of each DOF, and the first FRFs where the fit holds them, as one figure."""
-    panels: list[Panel] = []
-    for figure in fit_figures(fit):
-        dof = figure.key.removeprefix("joint_")
-        titles = (f"DOF {dof}: joint stiffness", "", f"DOF {dof}: joint compliance", "")
-        panels += [replace(panel, title=title) for panel, title in zip(figure.panels, titles, strict=True)]
-    if fit.data is not None:
-        frfs = frf_figures(compare_fit(fit), fit.freq_hz)[:_FRFS]
-        for first in range(0, len(frfs), 2):
-            beside = frfs[first : first + 2]
-            for part in zip(*(figure.panels for figure in beside), strict=True):
-                own = [
-                    replace(panel, title=figure.caption if panel.log_y else "")
-                    for panel, figure in zip(part, beside, strict=True)
-                ]
-                panels += [*own, *([Panel("", "", "")] * (2 - len(own)))]
-    return Figure("joint", "Joint found", tuple(panels), 2)
-
-
 def plot(fit: Fit) -> Any:
     """Draw the joint over frequency, K* and compliance of each DOF, and measured against regenerated FRFs.
 
@@ -312,4 +292,19 @@ def plot(fit: Fit) -> Any:
         matplotlib is missing.
     """
     check_type("fit", fit, Fit)
-    return laid_out(fit_overview(fit))
+    panels: list[Panel] = []
+    for figure in fit_figures(fit):
+        dof = figure.key.removeprefix("joint_")
+        titles = (f"DOF {dof}: joint stiffness", "", f"DOF {dof}: joint compliance", "")
+        panels += [replace(panel, title=title) for panel, title in zip(figure.panels, titles, strict=True)]
+    if fit.data is not None:
+        frfs = frf_figures(compare_fit(fit), fit.freq_hz)[:_FRFS]
+        for first in range(0, len(frfs), 2):
+            beside = frfs[first : first + 2]
+            for part in zip(*(figure.panels for figure in beside), strict=True):
+                own = [
+                    replace(panel, title=figure.caption if panel.log_y else "")
+                    for panel, figure in zip(part, beside, strict=True)
+                ]
+                panels += [*own, *([Panel("", "", "")] * (2 - len(own)))]
+    return laid_out(Figure("joint", "Joint found", tuple(panels), 2))
