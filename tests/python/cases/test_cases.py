@@ -15,6 +15,7 @@ from jointfrf.dofs import Parameter
 from jointfrf.identification.realisations import viscous_joints
 from jointfrf.substructuring.methods import STIFFNESS_METHODS
 from jointfrf.workbench.cases.catalogue import UnknownCaseError, find_case, list_cases, numbered, read_case, run_case
+from jointfrf.workbench.cases.comparison import verdict_sentence
 from jointfrf.workbench.cases.known_joint.exact import exact_frfs, noise_free_errors
 from jointfrf.workbench.cases.known_joint.figures import build_figures
 from jointfrf.workbench.cases.known_joint.realisations import estimate_realisations
@@ -25,7 +26,7 @@ from jointfrf.workbench.cases.known_joint.tables import (
     identified_rows,
 )
 from jointfrf.workbench.cases.workers import Workers
-from jointfrf.workbench.report.document import Page, make_document
+from jointfrf.workbench.report.document import Document, Section, make_document
 from thinned_cases import PLANE, SOLID
 
 NAMES = [*PLANE, *SOLID, "4.3.3-bolt"]
@@ -469,7 +470,7 @@ def test_numbers_and_report_of_six_dofs(solids):
         known = sum(len(one.values) for one in result.case.expected.frequencies)
         agreeing = counted.get("Natural frequencies of the assembly", "0 of 0")
         assert agreeing.endswith(f" of {known}")
-        report = make_document(Page(result.case.title, "", summary, tables, []).document)
+        report = make_document(Document(result.case.title, "", [Section("tables", "Tables", [*summary, *tables])]))
         assert all(f'id="{table.key}"' in report for table in tables)
         assert "<i>k</i><sub>Mθz</sub>" in report
 
@@ -555,6 +556,13 @@ def test_files_of_a_case(tmp_path, without_pictures):
     assert content["natural_frequencies_hz"]["actual"] == pytest.approx([2.598, 4.682, 7.770, 8.374], abs=6e-4)
     assert content["identified"][0]["published"] == 2010.9
     assert not [path.name for path in folder.rglob(".*")]
+    # The page begins with its verdict and one figure, before all tables.
+    page, other = output.report.read_text(), next(one.key for one in output.figures if one.key != "noise")
+    keys = ("noise", output.summary[0].key, output.tables[0].key, other)
+    places = [page.index(text) for text in (verdict_sentence(output.summary), *(f'id="{key}"' for key in keys))]
+    assert 0 < places[0] < page.index("</ul>")
+    assert places == sorted(places)
+    assert page.count('id="noise"') == 1
 
 
 @pytest.mark.parametrize(("options", "count"), [

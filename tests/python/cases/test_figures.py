@@ -10,8 +10,8 @@ from jointfrf.workbench.cases.catalogue import list_cases, numbered, read_case
 from jointfrf.workbench.cases.known_joint.figures import build_figures
 from jointfrf.workbench.cases.known_joint.keys import KnownJointCase
 from jointfrf.workbench.cases.known_joint.tables import build_summary, build_tables
-from jointfrf.workbench.report.document import Page, make_document
-from jointfrf.workbench.report.draw import STYLES, draw, shortened
+from jointfrf.workbench.report.document import Document, Picture, Section, make_document
+from jointfrf.workbench.report.draw import STYLES, draw, laid_out, shortened
 from jointfrf.workbench.report.figure import Curve, Figure, Interval, Panel
 from jointfrf.workbench.report.receptance import PHASE, phase_degrees
 from jointfrf.workbench.report.table import Table, as_text, shown, table_csv, turned
@@ -154,23 +154,31 @@ def test_an_interval_that_reaches_beyond_the_axis_ends_in_an_arrowhead():
         assert all(found.count(edge) == within.count(edge) + (edge in more) for edge in (left, right))
 
 
-def test_a_short_drawing_has_the_same_lines():
+def test_a_short_drawing_has_the_same_lines_and_texts():
     points = np.random.default_rng(3).uniform(0, 500, (40, 2))
     line = "M " + " \nL ".join(f"{x:.6f} {y:.6f}" for x, y in points)
-    svg = f'<svg><style></style><g id="a">\n <path d="{line} \n" style="fill: none"/>\n</g></svg>'
+    path = f'<path d="{line} \n" style="fill: none"/>'
+    svg = f'<svg><!-- a --><style></style><g id="a">\n {path}\n<text>1.2345</text></g></svg>'
     text = shortened(svg)
     assert len(text) < 0.8 * len(svg)
-    steps = np.array(re.search(r'd="m([^"]*)"', text)[1].split(), float).reshape(-1, 2)
-    np.testing.assert_allclose(np.cumsum(steps, axis=0), points, atol=0.0051)
-    # What is no line of straight pieces stays.
-    curve = '<path d="M 0 0 C 1.2345 2 3 4 5 6"/>'
-    assert shortened(curve) == curve
+    found = np.array(re.findall(r"[\d.]+", re.search(r' d="([^"]*)"', text)[1]), float).reshape(-1, 2)
+    np.testing.assert_allclose(found, points, atol=0.0051)
+    assert text.endswith("><text>1.2345</text></g></svg>")
+
+
+def test_numbers_along_an_axis_follow_its_limits():
+    panel = Panel("", "x, m", "k, N/m", (Curve("c", X, 1e6 * X, "actual"),))
+    (ax,) = laid_out(Figure("f", "", (panel,))).axes
+    assert [text.get_text() for text in ax.get_yticklabels()] == ["0.0", "2.5", "5.0", "7.5", "10.0"]
+    ax.set_ylim(0, 4e4)
+    assert [text.get_text() for text in ax.get_yticklabels()] == ["0", "10", "20", "30", "40"]
+    assert ax.get_ylabel() == "k, kN/m"
 
 
 def test_the_verdict_is_the_first_column_wherever_a_table_is_shown(result):
     tables = build_tables(result)
     summary = build_summary(result, tables)
-    text = make_document(Page("", "", summary, tables, []).document)
+    text = make_document(Document("", "", [Section("tables", "Tables", [*summary, *tables])]))
     judged = [table for table in (*summary, *tables) if "" in table.columns]
     regions = "section-3-2-figures-3-11-and-3-12"
     assert [table.key for table in judged] == ["agreement", "table-3-2", regions, "natural-frequencies", "noise-free"]
@@ -197,8 +205,8 @@ def test_the_summary_counts_verdicts(result):
 
 def test_a_page_fits_on_any_screen(result, figures):
     tables = build_tables(result)
-    some = [(figure, draw(figure)) for figure in figures[:1]]
-    text = make_document(Page("", "", build_summary(result, tables), tables, some).document)
+    parts = [*build_summary(result, tables), *tables, Picture(figures[0], draw(figures[0]))]
+    text = make_document(Document("", "", [Section("all", "All", parts)]))
     style = text.split("<style>")[1].split("</style>")[0]
     assert not re.search(r"overflow(-x)?:\s*(auto|scroll)|[^-]width:\s*\d+(px|pt|cm)", style)
     assert text.count('src="data:image/svg+xml,') == 1
@@ -215,5 +223,5 @@ def test_a_table_of_many_columns_is_turned_on_a_page():
     assert turned(wide).columns == ("by, from", "A, x", "B, x")
     assert turned(wide).rows == tuple((name, float(i), float(i)) for i, name in enumerate(names))
     assert turned(wide).percentages == ("A, x", "B, x")
-    body = make_document(Page("", "", [], [wide], []).document).split("<tbody>")[1]
+    body = make_document(Document("", "", [Section("tables", "Tables", [wide])])).split("<tbody>")[1]
     assert body.count("<tr") == 14

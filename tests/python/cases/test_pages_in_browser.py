@@ -12,7 +12,7 @@ import pytest
 
 import jointfrf as jf
 from browser import started_browser
-from jointfrf.workbench.report.document import Document, HeatMap, Page, Section, make_document
+from jointfrf.workbench.report.document import Document, HeatMap, Picture, Section, make_document
 from jointfrf.workbench.report.draw import draw
 from jointfrf.workbench.report.figure import Curve, Figure, Panel
 from jointfrf.workbench.report.table import Table
@@ -36,9 +36,8 @@ def pages(tmp_path_factory):
     figure = Figure("f", "A figure", (Panel("", "x", "y", (Curve("a", x, x, "actual"),)),))
     rows = tuple((f"row {i}", *map(float, range(11))) for i in range(120))
     table = Table("long", "A long table", ("name", *(f"column {c}, N/m" for c in range(11))), rows)
-    (folder / "case.html").write_text(
-        make_document(Page("A case", "About.", [table], [], [(figure, draw(figure))]).document)
-    )
+    sections = [Section("summary", "Summary", [table]), Section("figures", "Figures", [Picture(figure, draw(figure))])]
+    (folder / "case.html").write_text(make_document(Document("A case", "About.", sections)))
     names = [f"response {i}" for i in range(24)]
     heat = HeatMap("map", "A map", "response \\ force", names, names, np.linspace(0, 12, 576).reshape(24, 24), 1, 3)
     (folder / "map.html").write_text(make_document(Document("A map", "", [Section("s", "Map", [heat])])))

@@ -16,8 +16,8 @@ from jointfrf.io import Channel, FrfSet, write_frfs
 from jointfrf.toml.documents import schema_of
 from jointfrf.workbench.assembly_file.keys import AssemblyKeys
 from jointfrf.workbench.assembly_file.read import read_assembly_file
-from jointfrf.workbench.report.fit_model import is_wide
-from jointfrf.workbench.report.fit_page import ReportOptions, finding_sentences, fit_document
+from jointfrf.workbench.report.fit_page import ReportOptions, fit_document
+from jointfrf.workbench.report.fit_words import finding_sentences, is_wide
 from jointfrf.workbench.report.sketch import SketchedPart, _moved_parts, _view_along, assembly_sketch
 
 FREQ = np.linspace(0.5, 10, 300)

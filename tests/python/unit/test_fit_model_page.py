@@ -8,16 +8,9 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.workbench.report.fit import fit_figures
-from jointfrf.workbench.report.fit_model import (
-    assurance,
-    assurance_map,
-    band_map,
-    is_wide,
-    next_parts,
-    next_sentences,
-    unknowns_table,
-)
+from jointfrf.workbench.report.fit_frfs import assurance, assurance_map, band_map
 from jointfrf.workbench.report.fit_page import ReportOptions, fit_document
+from jointfrf.workbench.report.fit_words import is_wide, next_parts, next_sentences, unknowns_table
 
 FREQ = np.arange(15.0, 801.0, 8.0)
 SECTION = {"density": 2700.0, "width": 0.025, "height": 0.006, "loss_factor": 0.01}
@@ -126,3 +119,10 @@ def test_a_fit_goes_to_another_process_and_answers_there_as_here(fit):
     assert there.confidence_interval(0.95) == fit.confidence_interval(0.95)
     assert there.derived("c_y / k_y") == fit.derived("c_y / k_y")
     assert there.data.next_channels() == fit.data.next_channels()
+
+
+def test_axes_of_a_joint_without_lines_of_its_own_fit_what_was_found(fit):
+    loss = fit_figures(fit)[1].panels[3]
+    (curve,) = loss.curves
+    assert loss.y_label == "Im C, rad/(N m)"
+    assert np.ptp(loss.y_limits) == pytest.approx(1.3 * np.ptp(curve.y))

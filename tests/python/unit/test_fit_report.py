@@ -18,15 +18,10 @@ from jointfrf.workbench.report.document import Document, HeatMap, Section, make_
 from jointfrf.workbench.report.draw import STYLES
 from jointfrf.workbench.report.figure import Curve, Figure, Panel
 from jointfrf.workbench.report.fit import fit_figures
-from jointfrf.workbench.report.fit_frfs import compare_frfs
-from jointfrf.workbench.report.fit_page import (
-    ReportOptions,
-    finding_sentences,
-    fit_document,
-    parameter_table,
-    quality_sentences,
-)
-from jointfrf.workbench.report.sketch import _names, interface_points, interface_sketch, point_table
+from jointfrf.workbench.report.fit_frfs import compare_fit
+from jointfrf.workbench.report.fit_page import ReportOptions, fit_document
+from jointfrf.workbench.report.fit_words import finding_sentences, parameter_table, quality_sentences
+from jointfrf.workbench.report.sketch import interface_points, interface_sketch, point_table
 from jointfrf.workbench.report.table import written
 
 
@@ -268,7 +263,7 @@ def test_frfs_that_are_zero_by_symmetry_are_not_drawn():
     freq = np.arange(5.0, 300.0)
     variance = np.full((freq.size, 4, 4), 1e-16)
     fit = jf.identify(freq, _two_directions(freq, 3), ["x", "y"], noise=variance)
-    compared = compare_frfs(fit.data, fit.dofs)
+    compared = compare_fit(fit)
     assert compared.silent == 8
     assert sorted(compared.entries) == [(p, q) for p in range(4) for q in range(4) if (p - q) % 2 == 0]
     text = make_document(fit_document(fit, ReportOptions()))
@@ -278,7 +273,7 @@ def test_frfs_that_are_zero_by_symmetry_are_not_drawn():
 
 def test_a_page_begins_with_what_was_found_and_the_frf_that_fits_worst(fits):
     fit = fits["plain"]
-    compared = compare_frfs(fit.data, fit.dofs)
+    compared = compare_fit(fit)
     parts = fit_document(fit, ReportOptions()).sections[0].parts
     kinds = [type(part).__name__ for part in parts]
     assert kinds[:2] == ["Words", "Chart"]
@@ -317,7 +312,9 @@ def test_names_in_a_sketch_overprint_neither_each_other_nor_points(count):
     for i, a in enumerate(boxes):
         for b in (*boxes[i + 1 :], *circles):
             assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1], (a, b)
-    assert "<tip>" not in _names({"<tip>": (100.0, 100.0)}, [], 200.0)[0]
+    named = interface_sketch(sides, [points[0]._replace(name="<tip>"), *points[1:]], sides.dofs)
+    assert "&lt;tip&gt;" in named.svg
+    assert "<tip>" not in named.svg
 
 
 def test_the_table_of_points_has_no_coordinate_that_nobody_measured():
@@ -350,7 +347,7 @@ def test_maps_show_the_channel_that_is_wrong(beams):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         good, of_both, of_responses = (
-            compare_frfs(jf.identify(beams.freq, own, transform=sides).data, sides.dofs)
+            compare_fit(jf.identify(beams.freq, own, transform=sides))
             for own in (h, gain[:, None] * h * gain, (0.6 + 0.4 * gain)[:, None] * h)
         )
     apart = ~np.eye(10, dtype=bool)
@@ -374,7 +371,7 @@ def test_reciprocity_says_nothing_of_frfs_made_reciprocal(beams):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         fit = jf.identify(beams.freq, (gamma + gamma.swapaxes(1, 2)) / 2, ["y", "theta_z"])
-    assert compare_frfs(fit.data, fit.dofs).reciprocity is None
+    assert compare_fit(fit).reciprocity is None
 
 
 def long_fit(n_freq: int, n: int) -> Fit:

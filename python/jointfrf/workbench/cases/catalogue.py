@@ -20,8 +20,8 @@ from jointfrf.workbench.cases.comparison import verdict_sentence
 from jointfrf.workbench.cases.keys import Case, CaseKeys, ExpectedKeys
 from jointfrf.workbench.cases.kind import CaseKind
 from jointfrf.workbench.cases.workers import Workers
-from jointfrf.workbench.report.document import Document, Page, make_document
-from jointfrf.workbench.report.draw import Drawing, draw
+from jointfrf.workbench.report.document import Document, Listing, Picture, Section, Words, make_document
+from jointfrf.workbench.report.draw import draw
 from jointfrf.workbench.report.figure import Figure, figure_csv
 from jointfrf.workbench.report.table import Table, plain_rows, shown, table_csv
 
@@ -311,37 +311,37 @@ def run_case(
     printed = [table for table in tables if table.key not in kind.not_printed]
     show(case, [*summary, *printed])
     figures = numbered(case, kind.figures(result))
-    drawn = at_work.map(partial(draw, png=png), figures)
+    drawings = at_work.map(partial(draw, png=png), figures)
+    pictures = [Picture(figure, drawing) for figure, drawing in zip(figures, drawings, strict=True)]
+    sections = _sections(case, kind.headline, pictures, summary, tables)
     content = _common_numbers(case, count, tables) | kind.numbers(result)
-    page = Page(
-        title=case.title,
-        about=_about(case, count),
-        summary=summary,
-        tables=tables,
-        figures=list(zip(figures, drawn, strict=True)),
-        verdict=verdict_sentence(summary),
-        headline=next((key for key in kind.headline if any(one.key == key for one in figures)), ""),
-        subject="The case",
-        text=_text(case.folder, "README.md"),
-        sources=[("case.toml", _text(case.folder, "case.toml"))],
-    )
-    report = write_results(target, page.document, tables, page.figures, content)
+    report = write_results(target, Document(case.title, _about(case, count), sections), tables, content)
     return CaseOutput(case, result, tables, figures, summary, report, printed)
 
 
-def write_results(
-    folder: OwnFolder,
-    document: Document,
-    tables: Sequence[Table],
-    figures: Sequence[tuple[Figure, Drawing]],
-    content: Mapping[str, Any],
-) -> Path:
-    """Write a page and, beside it, its tables, figures and numbers; return the path of the page."""
+def _sections(
+    case: Case, headlines: Sequence[str], pictures: Sequence[Picture], summary: list[Table], tables: list[Table]
+) -> list[Section]:
+    """Return the sections of the page of a case; the first figure there is of `headlines` stands in the summary."""
+    keys = [one.figure.key for one in pictures]
+    first = [pictures[keys.index(key)] for key in headlines if key in keys][:1]
+    verdict = verdict_sentence(summary)
+    texts = [Listing(name, _text(case.folder, file)) for name, file in (("", "README.md"), ("case.toml",) * 2)]
+    return [
+        Section("summary", "Summary", [Words([verdict] if verdict else [], "findings"), *first, *summary]),
+        Section("tables", "Tables", tables),
+        Section("figures", "Figures", [one for one in pictures if one not in first]),
+        Section("subject", "The case", texts),
+    ]
+
+
+def write_results(folder: OwnFolder, document: Document, tables: Sequence[Table], content: Mapping[str, Any]) -> Path:
+    """Write a page and, beside it, its figures, tables and numbers; return the path of the page."""
     drawings, numbers = (folder / "figures").make(), (folder / "tables").make()
-    for figure, drawing in figures:
-        for suffix, content_of in ((".png", drawing.png), (".svg", drawing.svg), (".csv", figure_csv(figure))):
-            if content_of:
-                drawings.write(clean_name(figure.key, suffix), content_of)
+    for figure, (png, svg) in (part for part in document.parts if isinstance(part, Picture)):
+        for suffix, text in ((".png", png), (".svg", svg), (".csv", figure_csv(figure))):
+            if text:
+                drawings.write(clean_name(figure.key, suffix), text)
     for table in tables:
         numbers.write(clean_name(table.key, ".csv"), table_csv(table))
     folder.write("results.json", json.dumps(content, indent=1) + "\n")

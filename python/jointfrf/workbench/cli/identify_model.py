@@ -29,7 +29,7 @@ from jointfrf.workbench.cli.fit_results import write_results
 from jointfrf.workbench.cli.measured_file import setups_with_gains, stated_noise, without_warnings_of_fits
 from jointfrf.workbench.cli.progress import waiting
 from jointfrf.workbench.cli.usage import Failures, Interrupt, Output, UsageError, listed
-from jointfrf.workbench.report.fit_model import next_sentences
+from jointfrf.workbench.report.fit_words import next_sentences
 
 __all__ = ["run_model"]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,19 +13,17 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = [
     "FREQUENCY",
-    "axis_values",
     "bands_in_words",
     "bulk_limits",
     "format_axis",
     "modulus_label",
+    "numbered_axis",
     "parameter_label",
     "parameter_lines",
     "percentile_lines",
     "percentiles",
     "prefixed_unit",
     "symbol",
-    "tick_texts",
-    "value_text",
 ]
 
 #: SI prefixes by powers of ten.
@@ -38,8 +36,8 @@ _SHORT = (0.1, 1e4)
 _NARROW, _WIDE = 0.7, 2.0
 #: Digits of exponents.
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-#: Numbers along an axis at most, and where panels stand beside each other.
-_MOST_TICKS, _MOST_BESIDE = 10, 5
+#: Numbers along an axis that is short.
+_MOST_BESIDE = 5
 
 
 def prefixed_unit(unit: str, largest: float) -> tuple[str, float]:
@@ -142,56 +140,69 @@ def value_text(value: float) -> str:
     return "10" + str(power).translate(_RAISED)
 
 
-def format_axis(axis: Any, label: str, *, log: bool = False, step: float | None = None, beside: int = 1) -> None:
-    """Set label and numbers of an axis of matplotlib.
+class NumberedAxis(NamedTuple):
+    """Numbers along an axis: its label with their unit, the size of this unit, the values and their texts."""
+
+    label: str
+    size: float
+    values: list[float]
+    texts: list[str]
+
+
+def numbered_axis(
+    label: str, low: float, high: float, most: int, *, log: bool = False, step: float | None = None
+) -> NumberedAxis:
+    """Choose the numbers along an axis, in a unit with which they are short.
 
     Parameters
     ----------
-    axis : matplotlib.axis.Axis
-        Its limits are final.
     label : str
         "quantity, unit".
+    low, high : float
+        Limits.
+    most : int
+        Number of values at most, about.
     log : bool
+        Whether the axis is logarithmic.
     step : float, optional
-        Distance of the numbers.
-    beside : int
-        Panels beside each other.
+        Distance of the values; default 1, 2, 2.5 or 5 times a power of ten.
+
+    Examples
+    --------
+    >>> from jointfrf.workbench.report.axes import numbered_axis
+    >>> numbered_axis("k, N/m", 0.0, 2.5e6, 3)
+    NumberedAxis(label='k, MN/m', size=1000000.0, values=[0.0, 1000000.0, 2000000.0], texts=['0', '1', '2'])
     """
-    from matplotlib.ticker import LogLocator, MaxNLocator, MultipleLocator, NullFormatter
-
-    low, high = sorted(axis.get_view_interval())
-    decades = np.log10(high / low) if log and low > 0 else np.inf
-    if log and decades >= _WIDE:
-        axis.set_major_formatter(lambda value, _: value_text(value))  # mathematical text takes many times longer
-        axis.set_minor_formatter(NullFormatter())
-        axis.set_label_text(label)
-        return
     quantity, comma, unit = label.rpartition(", ")
-    unit, size = prefixed_unit(unit, max(abs(low), abs(high)))
-    most = _MOST_TICKS if beside == 1 else _MOST_BESIDE
-    if step is not None:
-        axis.set_major_locator(MultipleLocator(step))
-    elif log and decades >= _NARROW:
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    if log:
+        ends = float(np.log10(low)), float(np.log10(high))
+        values = [10.0**value for value in axis_values(*ends, most, log=True)]
+        if ends[1] - ends[0] >= _WIDE:
+            return NumberedAxis(label, 1.0, values, [value_text(value) for value in values])
+    elif step is not None:
+        values = (step * np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)).tolist()
     else:
-        axis.set_major_locator(MaxNLocator(most if axis.axis_name == "x" else _MOST_BESIDE, steps=[1, 2, 2.5, 5, 10]))
-    axis.set_major_formatter(_formatter(size))
-    axis.set_minor_formatter(NullFormatter())
-    axis.set_label_text(f"{quantity}{comma}{unit}")
+        values = axis_values(low, high, most)
+    unit, size = prefixed_unit(unit, max(abs(low), abs(high)))
+    return NumberedAxis(f"{quantity}{comma}{unit}", size, values, tick_texts([value / size for value in values]))
 
 
-def _formatter(size: float) -> Any:
-    """Write numbers in multiples of `size`."""
-    from matplotlib.ticker import Formatter
+def format_axis(
+    axis: Any, label: str, *, most: int = _MOST_BESIDE, log: bool = False, step: float | None = None
+) -> None:
+    """Set label and numbers of an axis of matplotlib as `numbered_axis` does, again when its limits change."""
+    from matplotlib.ticker import FixedFormatter, FixedLocator, NullFormatter
 
-    class InUnits(Formatter):
-        def __call__(self, x: float, pos: int | None = None) -> str:
-            return tick_texts([x / size])[0]
+    def renumber(_: Any = None) -> None:
+        low, high = sorted(axis.get_view_interval())
+        found = numbered_axis(label, low, high, most, log=log, step=step)
+        axis.set_major_locator(FixedLocator(found.values))
+        axis.set_major_formatter(FixedFormatter(found.texts))
+        axis.set_minor_formatter(NullFormatter())
+        axis.set_label_text(found.label)
 
-        def format_ticks(self, values: Sequence[float]) -> list[str]:
-            return tick_texts([float(value) / size for value in values])
-
-    return InUnits()
+    renumber()
+    axis.axes.callbacks.connect(f"{axis.axis_name}lim_changed", renumber)
 
 
 #: Label of the axis of all FRFs.

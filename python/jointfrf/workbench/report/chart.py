@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import colorsys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.kernel.arguments import FloatArray
-from jointfrf.workbench.report.axes import axis_values, prefixed_unit, tick_texts, value_text
+from jointfrf.workbench.report.axes import numbered_axis
 from jointfrf.workbench.report.draw import STYLES, Style
 from jointfrf.workbench.report.figure import Curve, Figure, Panel, Ribbon
 
-__all__ = ["Chart", "chart_view", "count_points", "style_rules", "thinned_dots", "thinned_line"]
+__all__ = ["Chart", "chart_view", "style_rules", "thinned_dots", "thinned_line"]
 
 #: Units of the paths along x and y: what a screen cannot show at full width may still be seen when zoomed in.
 _WIDE, _HIGH = 20000, 8000
@@ -26,12 +26,8 @@ _OFF = 3
 _MOST_X, _MOST_Y = 6, 5
 #: A step along x so many times longer than those beside it parts a curve.
 _GAP = 6.0
-#: Decades of a logarithmic axis from which on only powers of ten are written.
-_DECADES = 2.0
 #: Dots and outlying lines, points wide.
 _DOT, _CROSS = 2.4, 4.0
-#: Dashes of matplotlib's names, in widths of the line.
-_DASHES = {"-": (), "--": (4, 2), ":": (1, 1.8), "-.": (6, 2, 1, 2)}
 #: Lightness of colours on a dark page: from, to.
 _DARK = (0.36, 0.92)
 
@@ -43,11 +39,6 @@ class Chart:
     figure: Figure
     alt: str
     most: int = 4000
-
-
-def count_points(figures: Iterable[Figure]) -> list[int]:
-    """Return the number of points of every curve of figures."""
-    return [curve.x.size for figure in figures for panel in figure.panels for curve in panel.curves]
 
 
 def chart_view(chart: Chart) -> dict[str, Any]:
@@ -73,87 +64,58 @@ def chart_view(chart: Chart) -> dict[str, Any]:
 
 
 def _panel_view(panel: Panel, most: int) -> dict[str, Any]:
-    x_low, x_high = _x_limits(panel)
-    low, high = _y_limits(panel)
-    quantity, comma, unit = panel.y_label.rpartition(", ")
-    is_decades = panel.log_y and high - low >= _DECADES
-    largest = 10**high if panel.log_y else max(abs(low), abs(high))
-    shown_unit, size = (unit, 1.0) if is_decades else prefixed_unit(unit, largest)
+    x_ends, y_ends = _limits(panel)
+    x_axis = numbered_axis(panel.x_label, *x_ends, _MOST_X)
+    y_axis = numbered_axis(panel.y_label, *y_ends, _MOST_Y, log=panel.log_y, step=panel.y_step)
+    low, high = np.log10(y_ends).tolist() if panel.log_y else y_ends
 
     def place_x(x: FloatArray) -> FloatArray:
-        return (x - x_low) / (x_high - x_low) * _WIDE
+        return (x - x_ends[0]) / (x_ends[1] - x_ends[0]) * _WIDE
 
     def place_y(y: FloatArray) -> FloatArray:
         with np.errstate(divide="ignore", invalid="ignore"):
-            value = np.log10(y) if panel.log_y else y
-            up = (value - low) / (high - low)
+            up = ((np.log10(y) if panel.log_y else y) - low) / (high - low)
         return (1 - np.clip(np.where(np.isfinite(up), up, np.nan), -_OFF, 1 + _OFF)) * _HIGH
 
-    x_values, y_values = axis_values(x_low, x_high, _MOST_X), axis_values(low, high, _MOST_Y, log=panel.log_y)
-    if panel.y_step is not None:
-        first = np.ceil(low / panel.y_step) * panel.y_step
-        y_values = np.arange(first, high + 1e-9, panel.y_step).tolist()
-    y_places = place_y(10.0 ** np.array(y_values) if panel.log_y else np.array(y_values))
-    x_places = place_x(np.array(x_values))
-    curves = [
-        {"style": f"s-{curve.style}", "label": curve.label, "path": _path(curve, place_x, place_y, most)}
-        for curve in panel.curves
-    ]
-    areas = [{"style": f"r-{own.style}", "path": _area(own, place_x, place_y)} for own in panel.ribbons]
+    x_places, y_places = place_x(np.array(x_axis.values)).tolist(), place_y(np.array(y_axis.values)).tolist()
     return {
         "title": panel.title,
-        "y_label": f"{quantity}{comma}{shown_unit}",
+        "y_label": y_axis.label,
         "x_label": panel.x_label,
-        "unit": unit,
+        "unit": panel.y_label.rpartition(", ")[2],
         "limits": {
-            "x": [x_low, x_high], "y": [low, high], "log": panel.log_y, "size": size, "step": panel.y_step,
+            "x": x_ends, "y": (low, high), "log": panel.log_y, "size": y_axis.size, "step": panel.y_step,
         },
-        "x_ticks": [(100 * float(p) / _WIDE, t) for p, t in zip(x_places, tick_texts(x_values), strict=True)],
-        "y_ticks": [
-            (100 * (1 - float(p) / _HIGH), text)
-            for p, text in zip(y_places, _y_texts(y_values, size, log=panel.log_y, decades=is_decades), strict=True)
+        "x_ticks": [(100 * place / _WIDE, text) for place, text in zip(x_places, x_axis.texts, strict=True)],
+        "y_ticks": [(100 * (1 - place / _HIGH), text) for place, text in zip(y_places, y_axis.texts, strict=True)],
+        "grid": "".join([f"M{p:.0f} 0V{_HIGH}" for p in x_places] + [f"M0 {p:.0f}H{_WIDE}" for p in y_places]),
+        "areas": [{"style": f"r-{own.style}", "path": _area(own, place_x, place_y)} for own in panel.ribbons],
+        "curves": [
+            {"style": f"s-{curve.style}", "label": curve.label, "path": _path(curve, place_x, place_y, most)}
+            for curve in panel.curves
         ],
-        "grid": "".join(f"M{p:.0f} 0V{_HIGH}" for p in x_places)
-        + "".join(f"M0 {p:.0f}H{_WIDE}" for p in y_places),
-        "areas": areas,
-        "curves": curves,
         "height": panel.height,
     }  # fmt: skip
 
 
-def _y_texts(values: Sequence[float], size: float, *, log: bool, decades: bool) -> list[str]:
-    if decades:
-        return [value_text(10.0**value) for value in values]
-    return tick_texts([(10.0**value if log else value) / size for value in values])
-
-
-def _x_limits(panel: Panel) -> tuple[float, float]:
-    if panel.x_limits:
-        return panel.x_limits
-    low = min(float(curve.x[0]) for curve in panel.curves if curve.x.size)
-    high = max(float(curve.x[-1]) for curve in panel.curves if curve.x.size)
-    return (low, high) if high > low else (low - 0.5, high + 0.5)
-
-
-def _y_limits(panel: Panel) -> tuple[float, float]:
-    """Return the limits along y, logarithms where the axis is one."""
+def _limits(panel: Panel) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the limits along x and y: those of the panel, or those of its curves."""
+    low = min((float(curve.x[0]) for curve in panel.curves if curve.x.size), default=0.0)
+    high = max((float(curve.x[-1]) for curve in panel.curves if curve.x.size), default=0.0)
+    x_ends = panel.x_limits or ((low, high) if high > low else (low - 0.5, high + 0.5))
     if panel.y_limits is not None:
-        low, high = panel.y_limits
-        return (float(np.log10(low)), float(np.log10(high))) if panel.log_y else (float(low), float(high))
+        return x_ends, panel.y_limits
     values = np.concatenate([curve.y for curve in panel.curves])
     values = values[np.isfinite(values) & ((values > 0) | (not panel.log_y))]
-    if values.size == 0:
-        return (-1.0, 1.0)
-    if panel.log_y:
-        values = np.log10(values)
-    low, high = float(values.min()), float(values.max())
+    values = np.log10(values) if panel.log_y else values
+    low, high = (float(values.min()), float(values.max())) if values.size else (-1.0, 1.0)
     room = 0.06 * (high - low) or 0.05 * abs(high) or 1.0
-    return low - room, high + room
+    return x_ends, (10.0 ** (low - room), 10.0 ** (high + room)) if panel.log_y else (low - room, high + room)
 
 
 def _path(curve: Curve, place_x: Any, place_y: Any, most: int) -> str:
     """Write a curve as steps from point to point; dots as lines without a length."""
-    dots = bool(STYLES[curve.style].marker)
+    dots = STYLES[curve.style].dashes is None
     kept = (thinned_dots if dots else thinned_line)(np.asarray(curve.y, np.float64), most)
     x, y = (np.round(place(values[kept])) for place, values in ((place_x, curve.x), (place_y, curve.y)))
     known = np.isfinite(y)
@@ -203,13 +165,12 @@ def style_rules(charts: Iterable[Chart]) -> str:
 
 def _line_rule(name: str, style: Style) -> str:
     rule = f"fill:none;stroke:{style.colour};stroke-linejoin:round;"
-    if style.marker:
+    if style.dashes is None:
         cap, width = ("round", _DOT) if style.marker == "." else ("square", _CROSS)
         return f".s-{name}{{{rule}stroke-width:{width:g};stroke-linecap:{cap}}}"
-    pattern = _DASHES[style.dashes] if isinstance(style.dashes, str) else style.dashes[1]
-    dashes = " ".join(f"{max(style.width, 1) * part:.3g}" for part in pattern)
-    rest = f";stroke-dasharray:{dashes}" if dashes else ";stroke-linecap:round"
-    return f".s-{name}{{{rule}stroke-width:{style.width:g}{rest}}}"
+    dashes = " ".join(f"{max(style.width, 1) * part:.3g}" for part in style.dashes)
+    rest = f"stroke-dasharray:{dashes}" if dashes else "stroke-linecap:round"
+    return f".s-{name}{{{rule}stroke-width:{style.width:g};{rest}}}"
 
 
 def _on_dark(colour: str) -> str:
@@ -249,11 +210,14 @@ def thinned_line(y: FloatArray, most: int) -> NDArray[np.intp]:
     """
     if y.size <= most:
         return np.arange(y.size)
-    starts = _columns(y.size, max(most // 2, 1))
-    finite = np.isfinite(y)
-    lowest = _first_where(y, np.minimum.reduceat(np.where(finite, y, np.inf), starts), starts)
-    highest = _first_where(y, np.maximum.reduceat(np.where(finite, y, -np.inf), starts), starts)
-    return np.unique(np.concatenate([lowest, highest]))
+    width = int(np.ceil(y.size / max(most // 2, 1)))
+    starts = np.arange(0, y.size, width)
+    columns = np.full((starts.size, width), np.nan)
+    columns.flat[: y.size] = y
+    finite = np.isfinite(columns)
+    lowest = np.where(finite, columns, np.inf).argmin(axis=1)
+    highest = np.where(finite, columns, -np.inf).argmax(axis=1)
+    return np.unique(np.concatenate([starts + lowest, starts + highest]))
 
 
 def thinned_dots(y: FloatArray, most: int) -> NDArray[np.intp]:
@@ -273,17 +237,3 @@ def thinned_dots(y: FloatArray, most: int) -> NDArray[np.intp]:
     columns = max(most // _DOTS, 1)
     evenly = np.linspace(0, y.size - 1, (_DOTS - 2) * columns).astype(np.intp)
     return np.unique(np.concatenate([thinned_line(y, 2 * columns), evenly]))
-
-
-def _columns(size: int, count: int) -> NDArray[np.intp]:
-    return np.linspace(0, size, count, endpoint=False).astype(np.intp)
-
-
-def _first_where(y: FloatArray, value: FloatArray, starts: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the first place in each column that holds its value; its first place where it holds none."""
-    column = np.repeat(np.arange(starts.size), np.diff(np.append(starts, y.size)))
-    hit = np.flatnonzero(y == value[column])
-    found = starts.copy()
-    own, first = np.unique(column[hit], return_index=True)
-    found[own] = hit[first]
-    return found

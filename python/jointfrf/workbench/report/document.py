@@ -9,18 +9,19 @@ from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import quote
 
 import numpy as np
 
 from jointfrf.dofs import Parameter
 from jointfrf.extras import check_extras
+from jointfrf.files import write_file
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.messages.finding import Finding, worst_first
 from jointfrf.spelling import visible
 from jointfrf.workbench.report.chart import Chart, chart_view, style_rules
-from jointfrf.workbench.report.draw import Drawing
+from jointfrf.workbench.report.draw import Drawing, draw
 from jointfrf.workbench.report.figure import Figure
 from jointfrf.workbench.report.table import VERDICT, Table, shown, turned, without_repeats, written
 
@@ -28,7 +29,6 @@ __all__ = [
     "Document",
     "HeatMap",
     "Listing",
-    "Page",
     "Part",
     "Picture",
     "Section",
@@ -37,6 +37,7 @@ __all__ = [
     "make_document",
     "section_of_command",
     "words_of_findings",
+    "write_document",
 ]
 
 #: Up to so many columns fit on any screen; more than so many are written smaller; more than so many become rows.
@@ -59,9 +60,8 @@ class Words:
     folded: Sequence[Sequence[str]] = ()
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A figure as it is drawn: its SVG file becomes part of the page."""
+class Picture(NamedTuple):
+    """A figure that is drawn already: its SVG file becomes part of the page. A `Figure` is drawn for its page."""
 
     figure: Figure
     drawing: Drawing
@@ -112,22 +112,25 @@ class Listing:
     printed: bool = False
 
 
-Part = Table | Words | Picture | Chart | Sketch | HeatMap | Listing
+Part = Table | Words | Figure | Picture | Chart | Sketch | HeatMap | Listing
 
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what follows it; `more` are parts shown when the reader asks for them, under a name."""
+    """A heading and what follows it; `more` are parts shown when the reader asks for them, under a name.
+
+    A part that is None, or a table or text without content, is left out.
+    """
 
     key: str
     heading: str
-    parts: Sequence[Part]
+    parts: Sequence[Part | None]
     more: tuple[str, Sequence[Part]] = ("", ())
 
 
 @dataclass(frozen=True)
 class Document:
-    """What a page holds; tables without rows and sections without parts are left out."""
+    """The content of a page; sections without content are left out."""
 
     title: str
     about: str
@@ -137,14 +140,20 @@ class Document:
         kept = [replace(one, parts=[part for part in one.parts if not _is_empty(part)]) for one in self.sections]
         object.__setattr__(self, "sections", [one for one in kept if one.parts])
 
+    @property
+    def parts(self) -> list[Part]:
+        """All parts of all sections."""
+        return [part for one in self.sections for part in (*one.parts, *one.more[1]) if part is not None]
 
-def _is_empty(part: Part) -> bool:
-    return isinstance(part, Table) and not part.rows
+
+def _is_empty(part: Part | None) -> bool:
+    content = {Table: "rows", Words: "sentences", Listing: "text"}.get(type(part))
+    return part is None or (content is not None and not getattr(part, content))
 
 
 def section_of_command(command: str) -> Section:
     """Return the section that says how a page was made."""
-    return Section("made", "How this was made", [Listing("", command)] if command else [])
+    return Section("made", "How this was made", [Listing("", command)])
 
 
 #: Characters of a finding that stand in one line of a page.
@@ -212,12 +221,11 @@ def make_document(document: Document) -> str:
     import jinja2
     from markupsafe import Markup
 
-    parts = [part for section in document.sections for part in (*section.parts, *section.more[1])]
-    charts = [part for part in parts if isinstance(part, Chart)]
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_FOLDER), autoescape=True, undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True, finalize=_seen,
     )  # fmt: skip
+    charts = [part for part in document.parts if isinstance(part, Chart)]
     script = (_FOLDER / "chart.js").read_text(encoding="utf-8") if charts else ""
     script = script.replace("\r\n", "\n").replace("\r", "\n")  # as a browser reads it, whose checksum must be the same
     return environment.get_template("page.html.jinja").render(
@@ -225,19 +233,16 @@ def make_document(document: Document) -> str:
         policy=_policy(script),
         version=version("jointfrf"),
         verdict=VERDICT,
-        style=Markup(_style(parts, charts)),
+        style=Markup(_style(document.parts, charts)),
         script=Markup(script),
-        sections=[
-            {
-                "key": section.key,
-                "heading": section.heading,
-                "parts": [_view(part) for part in section.parts],
-                "more": section.more[0],
-                "hidden": [_view(part) for part in section.more[1]],
-            }
-            for section in document.sections
-        ],
+        views=lambda parts: [_view(part) for part in parts],
     )
+
+
+def write_document(document: Document, path: Path | str) -> Path:
+    """Write a page as a file, in a folder that exists, and return the path of the file."""
+    write_file(Path(path), make_document(document))
+    return Path(path)
 
 
 def _policy(script: str) -> str:
@@ -265,19 +270,18 @@ def _style(parts: Sequence[Part], charts: Sequence[Chart]) -> str:
 
 def _view(part: Part) -> dict[str, Any]:
     """Return what the template shows of a part; `kind` names its macro."""
+    shown: dict[str, Any] = {}
+    if isinstance(part, Figure):
+        part = Picture(part, draw(part, png=False))
     if isinstance(part, Table):
-        return {"kind": "table", **_table_view(part)}
-    if isinstance(part, Picture):
-        return {"kind": "picture", "figure": part.figure, "image": _as_address(part.drawing.svg)}
-    if isinstance(part, Chart):
-        return {"kind": "chart", **chart_view(part)}
-    if isinstance(part, HeatMap):
-        return {"kind": "map", **_map_view(part)}
-    if isinstance(part, Sketch):
-        from markupsafe import Markup
-
-        return {"kind": "sketch", "sketch": part, "svg": Markup(part.svg)}
-    return {"kind": "words" if isinstance(part, Words) else "listing", "part": part}
+        shown = _table_view(part)
+    elif isinstance(part, Picture):
+        shown = {"image": _as_address(part.drawing.svg)}
+    elif isinstance(part, Chart):
+        shown = chart_view(part)
+    elif isinstance(part, HeatMap):
+        shown = _map_view(part)
+    return {"kind": type(part).__name__.lower(), "part": part, **shown}
 
 
 def _as_address(svg: bytes) -> str:
@@ -298,7 +302,7 @@ def _map_view(part: HeatMap) -> dict[str, Any]:
         for name, own, shade in zip(part.rows, part.values.tolist(), shades.tolist(), strict=True)
     ]
     ends = [f"{value:.3g}" for value in (part.light, part.darkest)]
-    return {"map": part, "rows": rows, "dense": len(part.columns) > _DENSE, "ends": ends}
+    return {"rows": rows, "dense": len(part.columns) > _DENSE, "ends": ends}
 
 
 def _map_text(value: float, digits: int) -> str:
@@ -331,57 +335,3 @@ def _marked(parameter: Parameter) -> str:
 
     index = ",".join(dict.fromkeys((parameter.row, parameter.column))).replace("theta_", "θ").replace("theta", "θ")
     return Markup("<i>{}</i><sub>{}</sub>").format(parameter.kind, index)
-
-
-@dataclass(frozen=True)
-class Page:
-    """What a page holds.
-
-    Attributes
-    ----------
-    title : str
-    about : str
-        A sentence or two below it: what was computed from what.
-    summary : sequence of Table
-        Short tables.
-    tables : sequence of Table
-    figures : sequence of (Figure, Drawing)
-        Figures as they are drawn: the SVG files become part of the page.
-    subject : str
-        Heading of the texts that follow.
-    text : str
-        Shown as it is written; left out if empty.
-    sources : sequence of (name, text)
-        Shown when the reader asks for them.
-    verdict : str
-        The sentence that the page begins with.
-    headline : str
-        Key of the figure that follows it, before all tables.
-    """
-
-    title: str
-    about: str
-    summary: Sequence[Table]
-    tables: Sequence[Table]
-    figures: Sequence[tuple[Figure, Drawing]]
-    subject: str = ""
-    text: str = ""
-    sources: Sequence[tuple[str, str]] = ()
-    verdict: str = ""
-    headline: str = ""
-
-    @property
-    def document(self) -> Document:
-        """The page as sections and their parts."""
-        pictures = [Picture(figure, drawing) for figure, drawing in self.figures]
-        first = [one for one in pictures if one.figure.key == self.headline]
-        said = [Words([self.verdict], "findings")] if self.verdict else []
-        sections = [
-            Section("summary", "Summary", [*said, *first, *self.summary]),
-            Section("tables", "Tables", self.tables),
-            Section("figures", "Figures", [one for one in pictures if one not in first]),
-        ]
-        if self.subject:
-            texts = ([Listing("", self.text)] if self.text else []) + [Listing(*own) for own in self.sources]
-            sections.append(Section("subject", self.subject, texts))
-        return Document(self.title, self.about, sections)

@@ -1,10 +1,9 @@
-"""Figures drawn by matplotlib, without global state, as PNG and as SVG in a quarter of the length matplotlib writes."""
+"""Figures drawn by matplotlib, without global state, as PNG and as SVG."""
 
 from __future__ import annotations
 
 import io
 import re
-from collections import Counter
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -26,44 +25,44 @@ class Drawing(NamedTuple):
 
 
 class Style(NamedTuple):
-    """How a curve is drawn; dashes as matplotlib takes them."""
+    """How a curve is drawn; lengths of dashes and gaps in widths of the line, None for dots without a line."""
 
     colour: str
-    dashes: Any
+    dashes: tuple[float, ...] | None
     width: float
     marker: str = ""
 
 
 #: Curves differ by lightness and dashes, too, for prints in grey.
 STYLES = {
-    "actual": Style("#000000", "-", 1.5),
-    "initial": Style("#8c8c8c", "--", 1.2),
-    "measured": Style("#e07b00", "-", 0.7),
-    "mean": Style("#c0392b", (0, (5, 1.5)), 2.2),
-    "stiffness": Style("#8e7cc3", "-", 2.4),
-    "stiffness-initial": Style("#4b3d80", (0, (7, 2)), 1.2),
-    "damping": Style("#2e7d4f", (0, (4, 1.5, 1, 1.5, 1, 1.5)), 1.3),
-    "ismm": Style("#1b4f9c", "-", 1.1),
-    "ismm-kj": Style("#1b4f9c", (0, (5, 1)), 1.1),
-    "inverse-substructuring": Style("#1b4f9c", "--", 1.1),
-    "compliance": Style("#e07b00", "-.", 1.5),
-    "decoupling-rr": Style("#c0392b", "--", 1.1),
-    "decoupling-rs": Style("#5aa469", ":", 1.5),
-    "decoupling-sr": Style("#9b72b0", (0, (3, 1, 1, 1)), 1.1),
-    "decoupling-ss": Style("#d96a9a", (0, (6, 2)), 1.3),
-    "low": Style("#2f7fbf", ":", 1.4),
-    "high": Style("#e07b00", "--", 1.2),
-    "faint": Style("#a8a8a8", "-", 0.3),
-    "dots": Style("#8c8c8c", "", 1.0, "."),
-    "wide": Style("#eeb574", "-", 4.0),
-    "fitted": Style("#16365f", "-", 1.1),
-    "difference": Style("#8c8c8c", "-", 0.7),
-    "outlying": Style("#7b1a10", "", 1.0, "x"),
-    "ismm-points": Style("#1b4f9c", "-", 1.1, "o"),
-    "compliance-points": Style("#e07b00", "-.", 1.5, "D"),
-    "third-points": Style("#5aa469", (0, (5, 1)), 1.1, "s"),
-    "fourth-points": Style("#9b72b0", (0, (3, 1, 1, 1)), 1.1, "^"),
-    "fifth-points": Style("#c0392b", ":", 1.5, "v"),
+    "actual": Style("#000000", (), 1.5),
+    "initial": Style("#8c8c8c", (4, 1.6), 1.2),
+    "measured": Style("#e07b00", (), 0.7),
+    "mean": Style("#c0392b", (5, 1.5), 2.2),
+    "stiffness": Style("#8e7cc3", (), 2.4),
+    "stiffness-initial": Style("#4b3d80", (7, 2), 1.2),
+    "damping": Style("#2e7d4f", (4, 1.5, 1, 1.5, 1, 1.5), 1.3),
+    "ismm": Style("#1b4f9c", (), 1.1),
+    "ismm-kj": Style("#1b4f9c", (5, 1), 1.1),
+    "inverse-substructuring": Style("#1b4f9c", (4, 1.6), 1.1),
+    "compliance": Style("#e07b00", (6, 1.6, 1, 1.6), 1.5),
+    "decoupling-rr": Style("#c0392b", (4, 1.6), 1.1),
+    "decoupling-rs": Style("#5aa469", (1, 1.65), 1.5),
+    "decoupling-sr": Style("#9b72b0", (3, 1, 1, 1), 1.1),
+    "decoupling-ss": Style("#d96a9a", (6, 2), 1.3),
+    "low": Style("#2f7fbf", (1, 1.65), 1.4),
+    "high": Style("#e07b00", (4, 1.6), 1.2),
+    "faint": Style("#a8a8a8", (), 0.3),
+    "dots": Style("#8c8c8c", None, 1.0, "."),
+    "wide": Style("#eeb574", (), 4.0),
+    "fitted": Style("#16365f", (), 1.1),
+    "difference": Style("#8c8c8c", (), 0.7),
+    "outlying": Style("#7b1a10", None, 1.0, "x"),
+    "ismm-points": Style("#1b4f9c", (), 1.1, "o"),
+    "compliance-points": Style("#e07b00", (6, 1.6, 1, 1.6), 1.5, "D"),
+    "third-points": Style("#5aa469", (5, 1), 1.1, "s"),
+    "fourth-points": Style("#9b72b0", (3, 1, 1, 1), 1.1, "^"),
+    "fifth-points": Style("#c0392b", (1, 1.65), 1.5, "v"),
 }
 #: Bands of several names, light to dark.
 _SHADES = ("#ececec", "#d2d2d2", "#bdbdbd")
@@ -75,6 +74,8 @@ _THIN = 0.55
 _DENSE = ("faint", "dots")
 #: The middle of a distribution is seen through what lies around it.
 _ON_TOP, _HALO = ("ismm", "compliance"), 1.2
+#: Numbers along x at most, and where panels stand beside each other.
+_MOST, _MOST_BESIDE = 10, 5
 #: Size of a heading, points.
 _HEADING = 10
 #: Size of a figure, inches: fits the text width of A4.
@@ -88,7 +89,8 @@ _ARROW, _LETTER = 0.28, 1.45
 #: Texts stay texts; points that lie within 0.2 pixels of a line are left out.
 _SETTINGS = {"svg.fonttype": "none", "path.simplify_threshold": 0.2}
 #: Sizes that are read in a page of text width, and grids that stay behind the curves.
-_FONTS = {"font.size": 8.5, "axes.titlesize": 9, "legend.fontsize": 7.5, "axes.grid": True, "grid.alpha": 0.3,
+_FONTS = {"font.sans-serif": ["DejaVu Sans"], "font.size": 8.5, "axes.titlesize": 9,
+          "legend.fontsize": 7.5, "axes.grid": True, "grid.alpha": 0.3,
           "grid.linewidth": 0.5, "axes.axisbelow": True, "lines.solid_capstyle": "round"}  # fmt: skip
 
 
@@ -106,54 +108,25 @@ def draw(figure: Figure, png: bool = True) -> Drawing:
     Drawing
         The same data give the same files.
     """
-    check_extras("matplotlib")
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-
-    canvas, axes = _composed(figure)
+    canvas = laid_out(figure)
+    pixels, vectors = io.BytesIO(), io.BytesIO()
     with _settings(figure):
-        pixels, vectors = io.BytesIO(), io.BytesIO()
         canvas.set_dpi(_RESOLUTION if png else _RESOLUTION_INSIDE)
-        _keep_layout(canvas, axes)
-        # No version and no date inside. The renderer that found the layout has measured the texts.
+        canvas.draw_without_rendering()
+        canvas.set_layout_engine("none")  # for each file matplotlib would find the layout again
+        # No version and no date inside.
         if png:
-            canvas.canvas.print_png(pixels, metadata={"Software": None})
-        canvas.set_dpi(_RESOLUTION_INSIDE)
-        FigureCanvasSVG(canvas).print_svg(vectors, metadata={"Date": None, "Creator": None})
+            canvas.savefig(pixels, format="png", dpi=_RESOLUTION, metadata={"Software": None})
+        canvas.savefig(vectors, format="svg", dpi=_RESOLUTION_INSIDE, metadata={"Date": None, "Creator": None})
     return Drawing(pixels.getvalue(), shortened(vectors.getvalue().decode()).encode())
 
 
 def laid_out(figure: Figure) -> Any:
     """Return a figure as matplotlib has it, `matplotlib.figure.Figure`, not yet drawn."""
-    canvas, axes = _composed(figure)
-    canvas.align_ylabels(axes)
-    return canvas
-
-
-def _keep_layout(canvas: Any, axes: list[Any]) -> None:
-    """Find the layout and hold it; labels of panels above each other are aligned.
-
-    For each file matplotlib would find the places of labels and titles anew, and for each aligned label measure the
-    texts of all panels.
-    """
-    canvas.get_layout_engine().execute(canvas)
-    canvas.set_layout_engine("none")
-    places = {axis: axis.label.get_transform().transform(axis.label.get_position())
-              for ax in canvas.axes for axis in (ax.xaxis, ax.yaxis)}  # fmt: skip
-    columns: dict[int, list[Any]] = {}
-    for ax in axes:
-        columns.setdefault(ax.get_subplotspec().colspan.start, []).append(ax.yaxis)
-    for column in columns.values():
-        for axis in column:
-            places[axis] = (min(places[one][0] for one in column), places[axis][1])
-    for axis, place in places.items():
-        axis.set_label_coords(*axis.axes.transAxes.inverted().transform(place))
-
-
-def _composed(figure: Figure) -> tuple[Any, list[Any]]:
-    """Return a figure as matplotlib has it and its panels, without colour bars; places of labels are not yet found."""
     check_extras("matplotlib")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Canvas
+    from matplotlib.text import Text
 
     heights = _row_heights(figure)
     with _settings(figure):
@@ -166,14 +139,18 @@ def _composed(figure: Figure) -> tuple[Any, list[Any]]:
             if not panel.is_blank:
                 axes.append(canvas.add_subplot(grid[row, column]))
                 _draw_panel(axes[-1], panel, figure.columns)
-                if column and panel.intervals and _names(panel) == _names(figure.panels[i - 1]):
+                names = [[interval.label for interval in own.intervals] for own in figure.panels[i - 1 : i + 1]]
+                if column and panel.intervals and names[0] == names[1]:
                     axes[-1].tick_params(labelleft=False)
         _draw_axes_of_space([ax for ax in axes if not ax.axison])
         _add_legend(canvas, axes)
         if figure.heading:
             canvas.suptitle(figure.heading, fontsize=_HEADING)
-        _make_drawable(canvas)
-    return canvas, axes
+        for text in canvas.findobj(Text):
+            if words := text.get_text():
+                text.set_text(_drawable(words))
+        canvas.align_ylabels(axes)
+    return canvas
 
 
 def _settings(figure: Figure) -> Any:
@@ -186,18 +163,9 @@ def _settings(figure: Figure) -> Any:
     return style.context(["default", {**_FONTS, **_SETTINGS, "svg.hashsalt": figure.key}])
 
 
-def _make_drawable(canvas: Any) -> None:
-    """Check texts, which may come from a file: wrong formulas are drawn as plain text, invisible characters escaped."""
-    from matplotlib.text import Text
-
-    for text in canvas.findobj(Text):
-        if words := text.get_text():
-            text.set_text(_drawable(words))
-
-
 @lru_cache(1000)
 def _drawable(words: str) -> str:
-    """Return a text as it can be drawn."""
+    """Return a text of whatever source as it can be drawn: wrong formulas and invisible characters escaped."""
     from matplotlib.mathtext import MathTextParser
 
     words = visible(words, "\n")
@@ -209,37 +177,35 @@ def _drawable(words: str) -> str:
     return words
 
 
-def _names(panel: Panel) -> list[str]:
-    return [interval.label for interval in panel.intervals]
-
-
 def _row_heights(figure: Figure) -> list[float]:
     """Heights of the rows of panels, inches."""
     rows = [figure.panels[i : i + figure.columns] for i in range(0, len(figure.panels), figure.columns)]
     heights = []
     for row in rows:
         intervals = _INTERVALS[0] + _INTERVALS[1] * max(len(panel.intervals) for panel in row)
-        usual = _SPACE_HEIGHT if all(panel.is_blank or _in_space(panel) for panel in row) else _PANEL_HEIGHT
+        usual = (
+            _SPACE_HEIGHT
+            if all(panel.is_blank or (panel.surface and panel.surface.in_space) for panel in row)
+            else _PANEL_HEIGHT
+        )
         heights.append(max(usual * max(panel.height for panel in row), intervals if intervals > _PANEL_HEIGHT else 0))
     return [1.25 * height for height in heights] if len(figure.panels) == 1 else heights
 
 
 def _draw_panel(ax: Any, panel: Panel, beside: int) -> None:
+    most = _MOST_BESIDE if beside > 1 else _MOST
     if panel.surface is not None:
-        _draw_surface(ax, panel.surface, (panel.x_label, panel.y_label), beside)
+        _draw_surface(ax, panel.surface)
     elif panel.intervals:
         _draw_intervals(ax, panel)
-        format_axis(ax.xaxis, panel.x_label, beside=beside)
     else:
         _draw_curves(ax, panel)
-        format_axis(ax.xaxis, panel.x_label, log=panel.log_x, beside=beside)
+    if ax.axison:
+        format_axis(ax.xaxis, panel.x_label, most=most, log=panel.log_x)
+    if ax.axison and not panel.intervals:
         format_axis(ax.yaxis, panel.y_label, log=panel.log_y, step=panel.y_step)
         ax.tick_params(labelbottom=bool(panel.x_label))
     ax.set_title(panel.title, y=1.0)  # no numbers above the panel make way for it
-
-
-def _in_space(panel: Panel) -> bool:
-    return panel.surface is not None and panel.surface.faces.shape[2] == 3
 
 
 def _add_legend(canvas: Any, axes: list[Any]) -> None:
@@ -253,6 +219,12 @@ def _add_legend(canvas: Any, axes: list[Any]) -> None:
         canvas.legend(found.values(), found.keys(), loc="outside lower center", ncols=columns, frameon=False)
 
 
+def _look(style: str, share: float = 1.0) -> dict[str, Any]:
+    """Return colour, dashes and width of a line as matplotlib takes them."""
+    colour, dashes, width, _ = STYLES[style]
+    return {"color": colour, "ls": "" if dashes is None else (0, dashes) if dashes else "-", "lw": share * width}
+
+
 def _draw_curves(ax: Any, panel: Panel) -> None:
     from matplotlib.patheffects import Normal, Stroke
 
@@ -263,21 +235,19 @@ def _draw_curves(ax: Any, panel: Panel) -> None:
         colour = STYLES[ribbon.style].colour
         ax.fill_between(ribbon.x, ribbon.low, ribbon.high, color=colour, alpha=0.25, lw=0, label=ribbon.label)
     for curve in panel.curves:
-        colour, dashes, width, marker = STYLES[curve.style]
-        width *= _THIN if curve.thin else 1
-        look = {"color": colour, "ls": dashes, "lw": width, "marker": marker, "ms": _MARKER}
-        dense = curve.style in _DENSE
+        look, dense = _look(curve.style, _THIN if curve.thin else 1.0), curve.style in _DENSE
         (line,) = ax.plot(
-            curve.x, curve.y, label=curve.label or None, rasterized=dense, zorder=1.5 if dense else 2, **look
-        )
+            curve.x, curve.y, label=curve.label or None, rasterized=dense, zorder=1.5 if dense else 2,
+            marker=STYLES[curve.style].marker, ms=_MARKER, **look,
+        )  # fmt: skip
         if panel.ribbons and curve.style in _ON_TOP:
-            line.set_path_effects([Stroke(linewidth=width + _HALO, foreground="#ffffff"), Normal()])
+            line.set_path_effects([Stroke(linewidth=look["lw"] + _HALO, foreground="#ffffff"), Normal()])
     for level in panel.levels:
-        colour, dashes, width, _ = STYLES[level.style]
+        look = _look(level.style)
         if not level.bands:
-            ax.axhline(level.value, color=colour, ls=dashes, lw=width, label=level.label, zorder=1.9)
+            ax.axhline(level.value, label=level.label, zorder=1.9, **look)
         for b, (low, high) in enumerate(level.bands):
-            ax.plot([low, high], [level.value] * 2, color=colour, ls=dashes, lw=width, label=None if b else level.label)
+            ax.plot([low, high], [level.value] * 2, label=None if b else level.label, **look)
     for i, (label, bands) in enumerate(panel.strips):
         for b, (low, high) in enumerate(bands):
             ax.axvspan(low, high, 0.01 + 0.03 * i, 0.03 + 0.03 * i, color=("#000000", "#7f7f7f")[i % 2], lw=0,
@@ -294,12 +264,12 @@ def _draw_curves(ax: Any, panel: Panel) -> None:
         ax.set_ylim(*panel.y_limits)
 
 
-def _draw_surface(ax: Any, surface: Surface, labels: tuple[str, str], beside: int) -> None:
+def _draw_surface(ax: Any, surface: Surface) -> None:
     """Draw shaded quadrilaterals in space or in a plane, light where the value is small."""
     from matplotlib.collections import PolyCollection
 
     faces, values, edges = surface.faces, surface.values, surface.edges
-    if faces.shape[2] == 3:
+    if surface.in_space:
         order = np.argsort((faces @ _VIEW[2]).mean(axis=1))  # what is near is drawn last
         faces, values = (faces @ _VIEW[:2].T)[order], values[order]
         edges = None if edges is None else edges @ _VIEW[:2].T
@@ -312,11 +282,8 @@ def _draw_surface(ax: Any, surface: Surface, labels: tuple[str, str], beside: in
     ax.add_collection(patches)
     ax.autoscale_view()
     ax.set_aspect("equal")
-    if surface.faces.shape[2] == 3:
+    if surface.in_space:
         ax.set_axis_off()
-    else:
-        format_axis(ax.xaxis, labels[0], beside=beside)
-        format_axis(ax.yaxis, labels[1])
     if surface.label:
         bar = ax.figure.colorbar(patches, ax=ax, shrink=0.8, pad=0.02)
         format_axis(bar.ax.yaxis, surface.label)
@@ -337,16 +304,6 @@ def _draw_axes_of_space(axes: list[Any]) -> None:
             ax.text(*place, letter, ha="center", va="center", style="italic", fontsize=7.5, color="#303030")
 
 
-def _mark_what_reaches_beyond(ax: Any, panel: Panel, places: np.ndarray, colour: str) -> None:
-    """Put an arrowhead where an interval reaches beyond the axis, so that it is not read as one that ends there."""
-    assert panel.x_limits is not None
-    left, right = panel.x_limits
-    beyond = [(left, place, "<") for i, place in zip(panel.intervals, places, strict=True) if i.low < left]
-    beyond += [(right, place, ">") for i, place in zip(panel.intervals, places, strict=True) if i.high > right]
-    for edge, place, marker in beyond:
-        ax.plot([edge], [place], marker, color=colour, ms=6, clip_on=False, zorder=5)
-
-
 def _draw_intervals(ax: Any, panel: Panel) -> None:
     places = np.arange(len(panel.intervals))[::-1]
     middle = np.array([i.median for i in panel.intervals])
@@ -358,61 +315,35 @@ def _draw_intervals(ax: Any, panel: Panel) -> None:
     if known:
         ax.plot(*zip(*known, strict=True), "D", color="#e07b00", mec="black", mew=0.6, ms=5, label="thesis")
     for level in panel.levels:
-        shade, dashes, width, _ = STYLES[level.style]
-        ax.axvline(level.value, color=shade, ls=dashes, lw=width, label=level.label, zorder=1)
+        ax.axvline(level.value, label=level.label, zorder=1, **_look(level.style))
     ax.set_yticks(places, [i.label for i in panel.intervals])
     ax.set_ylim(-0.7, len(places) - 0.3)
-    if panel.x_limits:
-        ax.set_xlim(*panel.x_limits)
-        _mark_what_reaches_beyond(ax, panel, places, colour)
     ax.set_ylabel(panel.y_label)
+    if panel.x_limits:
+        left, right = panel.x_limits
+        ax.set_xlim(left, right)
+        # An arrowhead, so that an interval that reaches beyond the axis is not read as one that ends there.
+        for interval, place in zip(panel.intervals, places, strict=True):
+            for edge, marker, reaches in ((left, "<", interval.low < left), (right, ">", interval.high > right)):
+                if reaches:
+                    ax.plot([edge], [place], marker, color=colour, ms=6, clip_on=False, zorder=5)
 
 
-#: What `shortened` looks for: lines of straight pieces, styles, numbers.
-_LINE = re.compile(r' d="M ([\d.\sL-]++)(z?)\s*+"')
-_STYLE = re.compile(r' style="([^"]*)"')
+#: What `shortened` looks for: places, and numbers in them.
+_PLACES = re.compile(r' (?:d|x|y|transform)="[^"]*"')
 _DECIMALS = re.compile(r"(?<!\d)\d++\.\d{3,}")
 
 
 def shortened(svg: str) -> str:
-    r"""Write a drawing shorter: nobody sees a hundredth of a typographic point.
-
-    Parameters
-    ----------
-    svg : str
-        As matplotlib writes it, text as text.
-
-    Returns
-    -------
-    str
-        Lines as steps from point to point, places in hundredths of a point, styles that occur often as classes; without
-        names of groups and without space between elements.
+    r"""Write a drawing of matplotlib shorter: without comments, with places in hundredths of a typographic point.
 
     Examples
     --------
     >>> from jointfrf.workbench.report.draw import shortened
     >>> shortened('<g id="a"> <path d="M 1.2345 2 \nL 2.5 2.25 \n" style="fill: none"/> </g>')
-    '<g><path d="m1.23 2 1.27 0.25" style="fill: none"/></g>'
+    '<g id="a"><path d="M 1.23 2 L 2.5 2.25 " style="fill: none"/></g>'
     """
-    svg = svg[svg.index("<svg") if "<svg" in svg else 0 :]
+    svg = svg[max(svg.find("<svg"), 0) :]
     svg = re.sub(r"<metadata>(?:(?!</?metadata>).)*</metadata>|<!--(?:(?!-->|<!--).)*-->", "", svg, flags=re.DOTALL)
-    svg = re.sub(r">\s+<", "><", svg)
-    svg = re.sub(r'<g id="[^"]*"', "<g", svg)
-    svg = _LINE.sub(_steps, svg)
-    svg = re.sub(r' (?:x|y|transform)="[^"]*"', lambda match: _DECIMALS.sub(_rounded, match[0]), svg)
-    often = [style for style, count in Counter(_STYLE.findall(svg)).items() if count > 1]
-    classes = {style: f"c{i}" for i, style in enumerate(often)}
-    rules = "".join(f".{name}{{{style}}}" for style, name in classes.items())
-    svg = _STYLE.sub(lambda match: f' class="{classes[match[1]]}"' if match[1] in classes else match[0], svg)
-    return svg.replace("</style>", rules + "</style>", 1)
-
-
-def _steps(match: re.Match[str]) -> str:
-    """Write a line of straight pieces as its first point and the steps to the others."""
-    points = np.round(np.array(match[1].replace("L", " ").split(), np.float64).reshape(-1, 2), 2)
-    steps = np.diff(points, axis=0, prepend=0)
-    return ' d="m' + " ".join(f"{value:.2f}".rstrip("0").rstrip(".") for value in steps.ravel()) + match[2] + '"'
-
-
-def _rounded(number: re.Match[str]) -> str:
-    return f"{float(number[0]):.2f}"
+    svg = re.sub(r"\s+", " ", svg).replace("> <", "><")
+    return _PLACES.sub(lambda place: _DECIMALS.sub(lambda number: f"{float(number[0]):.2f}", place[0]), svg)

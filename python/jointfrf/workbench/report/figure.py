@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -12,7 +10,7 @@ from numpy.typing import NDArray
 
 from jointfrf.frf.bands import Band
 from jointfrf.kernel.arguments import FloatArray
-from jointfrf.workbench.report.table import csv_cell
+from jointfrf.workbench.report.table import csv_text
 
 __all__ = [
     "Curve",
@@ -87,6 +85,11 @@ class Surface:
     label: str = ""
     edges: FloatArray | None = None
 
+    @property
+    def in_space(self) -> bool:
+        """Whether corners have three coordinates."""
+        return bool(self.faces.shape[2] == 3)
+
 
 @dataclass(frozen=True)
 class Panel:
@@ -150,12 +153,8 @@ class Figure:
 
 def figure_csv(figure: Figure) -> str:
     """Write the data of a figure as CSV, a line for each point: panel, curve, x, y and the upper limit of an area."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["panel", "curve", "x", "y", "y_high"])
-    for number, panel in enumerate(figure.panels, 1):
-        writer.writerows(map(csv_cell, (panel.title or str(number), *row)) for row in _panel_rows(panel))
-    return text.getvalue()
+    rows = ((panel.title or str(i), *row) for i, panel in enumerate(figure.panels, 1) for row in _panel_rows(panel))
+    return csv_text([("panel", "curve", "x", "y", "y_high"), *rows])
 
 
 def _panel_rows(panel: Panel) -> Iterator[tuple[object, ...]]:

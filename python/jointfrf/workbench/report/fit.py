@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple, cast, get_args
+from typing import Any, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +25,10 @@ from jointfrf.laws.law_joint import LawJoint
 from jointfrf.workbench.report.axes import FREQUENCY, bulk_limits
 from jointfrf.workbench.report.draw import draw, laid_out
 from jointfrf.workbench.report.figure import Curve, Figure, Panel, Ribbon
-from jointfrf.workbench.report.fit_frfs import compare_frfs, compare_model, frf_figures
+from jointfrf.workbench.report.fit_frfs import compare_fit, frf_figures
 from jointfrf.workbench.report.table import Cell, Table
 
-__all__ = ["fit_figures", "fit_overview", "information_figure", "information_table", "plot", "shown_name", "write_fit"]
+__all__ = ["fit_figures", "fit_information", "plot", "shown_name", "write_fit"]
 
 
 def fit_figures(fit: Fit) -> list[Figure]:
@@ -60,14 +60,24 @@ def fit_figures(fit: Fit) -> list[Figure]:
     for d, dof in enumerate(fit.dofs):
         if fit.laws is not None and dof in fit.laws.rigid:
             continue
-        stiffness = Parameter.of_dof("k", dof)
+        stiffness, own = Parameter.of_dof("k", dof), used[:, d]
+        # A stiffness that cannot be distinguished from a rigid one is drawn by its lower bound.
+        low, high = (0.0, 0.0) if fit.laws is not None else fit.confidence_interval(0.95)[stiffness.name]
+        bound = Curve("lower bound of k, 95 %", freq[[0, -1]], np.full(2, low), "high") if low > 0 else None
         panels = []
-        for label, each, curve, ribbons in (
-            (f"K*, {stiffness.unit}", lines[:, d, d], fitted, _intervals(fit, stiffness, freq)),
-            (f"C, {compliance_unit(dof, dof)}", each_compliance[:, d], compliance, ((), ())),
+        for name, unit, each, found, ribbons in (
+            ("K*", stiffness.unit, lines[:, d, d], fitted[:, d, d], _intervals(fit, stiffness, freq)),
+            ("C", compliance_unit(dof, dof), each_compliance[:, d], compliance[:, d, d], ((), ())),
         ):
-            own = _EntryLines(fit.method, label, freq, each, curve[:, d, d], used[:, d], ribbons)
-            panels += _panels(own if label.startswith("C") else _as_open(own, fit, stiffness))
+            curves: list[Curve | None] = [Curve(f"fit ({fit.method})", freq, part, "actual")
+                                          for part in (found.real, found.imag)]  # fmt: skip
+            each = np.where(np.isfinite(each), each, complex(np.nan, np.nan))
+            if name == "K*" and not np.isfinite(high):
+                curves = [bound, None]
+            panels += [
+                _panel(f"Re {name}, {unit}", freq, each.real, own, curves[0], ribbons[0]),
+                _panel(f"Im {name}, {unit}", freq, each.imag, own, curves[1], ribbons[1]),
+            ]
         words = f"Joint DOF {dof}: complex stiffness K* and compliance C"
         figures.append(Figure(f"joint_{dof}", words, tuple(panels), 2, heading=words))
     return figures
@@ -79,22 +89,6 @@ def _inverted(k_lines: ComplexArray) -> ComplexArray:
         return np.asarray(np.einsum("ldd->ld", k_lines))
     inverse = invert(np.where(np.isfinite(k_lines), k_lines, 0), on_singular="nan")
     return np.asarray(np.einsum("ldd->ld", inverse))
-
-
-class _EntryLines(NamedTuple):
-    """One entry of K* or C: values of each line by itself, as fitted, which lines were used, intervals or bound.
-
-    `intervals` are those of the real and of the imaginary part.
-    """
-
-    method: str
-    label: str
-    freq_hz: FloatArray
-    each: ComplexArray
-    fitted: ComplexArray
-    used: NDArray[np.bool_]
-    intervals: tuple[tuple[Ribbon, ...], tuple[Ribbon, ...]] = ((), ())
-    bound: float | None = None
 
 
 def _stiffness_found(fit: Fit, freq_hz: FloatArray) -> ComplexArray:
@@ -151,42 +145,26 @@ def _intervals(fit: Fit, stiffness: Parameter, freq_hz: FloatArray) -> tuple[tup
     return ribbon(stiffness.name, "k", np.ones(2)), of_damping
 
 
-def _as_open(lines: _EntryLines, fit: Fit, stiffness: Parameter) -> _EntryLines:
-    """Put the lower bound in place of a stiffness that cannot be distinguished from a rigid one."""
-    if fit.laws is not None:
-        return lines
-    low, high = fit.confidence_interval(0.95)[stiffness.name]
-    return lines if np.isfinite(high) else lines._replace(bound=max(low, 0.0))
-
-
-def _panels(lines: _EntryLines) -> list[Panel]:
-    """Real and imaginary part of one entry; the bound belongs to the real part."""
-    panels = []
-    used, out = lines.used, ~lines.used
-    for part, values, curve, ribbons in (
-        ("Re", lines.each.real, lines.fitted.real, lines.intervals[0]),
-        ("Im", lines.each.imag, lines.fitted.imag, lines.intervals[1]),
-    ):
-        is_known = np.isfinite(lines.each[used]).any()
-        curves = [Curve("each line", lines.freq_hz[used], values[used], "dots")] if is_known else []
-        shown: list[float] = []
-        if lines.bound is None:
-            curves.append(Curve(f"fit ({lines.method})", lines.freq_hz, curve, "actual"))
-            shown = [float(curve.min()), float(curve.max())] if np.isfinite(curve).all() else []
-        elif part == "Re" and lines.bound > 0:
-            ends = lines.freq_hz[[0, -1]]
-            curves.append(Curve("lower bound of k, 95 %", ends, np.full(2, lines.bound), "high"))
-            shown = [lines.bound]
-        if out.any():
-            curves.append(Curve("lines left out", lines.freq_hz[out], values[out], "outlying"))
-        if ribbons and not is_known:
-            # Without lines by themselves the axis fits the interval.
-            shown += [float(end) for one in ribbons for end in (one.low.min(), one.high.max())]
-            limits = bulk_limits([], shown, least_room=0.0)
-        else:
-            limits = bulk_limits([values], shown)
-        panels.append(Panel("", FREQUENCY, f"{part} {lines.label}", tuple(curves), ribbons, y_limits=limits))
-    return panels
+def _panel(
+    label: str, freq: FloatArray, each: FloatArray, used: NDArray[np.bool_], found: Curve | None,
+    ribbons: tuple[Ribbon, ...],
+) -> Panel:  # fmt: skip
+    """Draw one part of K* or C: each line by itself, what was found of all, and its intervals."""
+    is_known = np.isfinite(each[used]).any()
+    curves = [Curve("each line", freq[used], each[used], "dots")] if is_known else []
+    shown: list[float] = []
+    if found is not None:
+        curves.append(found)
+        shown = [float(found.y.min()), float(found.y.max())] if np.isfinite(found.y).all() else []
+    if not used.all():
+        curves.append(Curve("lines left out", freq[~used], each[~used], "outlying"))
+    if ribbons and not is_known:
+        # Without lines by themselves the axis fits the interval.
+        shown += [float(end) for one in ribbons for end in (one.low.min(), one.high.max())]
+        limits = bulk_limits([], shown, least_room=0.0)
+    else:
+        limits = bulk_limits([each], shown)
+    return Panel("", FREQUENCY, label, tuple(curves), ribbons, y_limits=limits)
 
 
 def write_fit(fits: Sequence[Fit], folder: Path, source: str, figures: Sequence[Figure] = ()) -> list[Path]:
@@ -217,12 +195,11 @@ def write_fit(fits: Sequence[Fit], folder: Path, source: str, figures: Sequence[
     """
     text = json.dumps({"source": source, "fits": [fit_to_dict(fit, lines=False) for fit in fits]}, indent=2)
     contents: dict[str, str | bytes] = {"identification.json": text + "\n"}
-    for i, fit in enumerate(fits):
-        for figure in fit_figures(fit):
-            stem = figure.key if i == 0 else f"{figure.key}_{fit.method}"
-            contents[f"{stem}.png"], contents[f"{stem}.svg"] = draw(figure)
-    for figure in figures:
-        contents[f"{figure.key}.png"], contents[f"{figure.key}.svg"] = draw(figure)
+    drawn = [
+        (f"{one.key}_{fit.method}" if i else one.key, one) for i, fit in enumerate(fits) for one in fit_figures(fit)
+    ]
+    for stem, figure in [*drawn, *((one.key, one) for one in figures)]:
+        contents[f"{stem}.png"], contents[f"{stem}.svg"] = draw(figure)
     own = OwnFolder(folder).make()
     return [own.write(clean_name(name), content) for name, content in contents.items()]
 
@@ -244,17 +221,20 @@ def shown_name(one: FittedParameter) -> Cell:
     return Parameter(cast(ParameterKind, one.kind), one.row, one.column) if is_spring else one.name
 
 
-def information_table(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Table:
-    """Return for each parameter below which frequency a tenth, half and nine tenths of the information lie.
+def fit_information(fit: Fit) -> tuple[Figure | None, Table | None]:
+    """Return where in frequency the information on each parameter lies, for a fit of FRFs between all joint DOFs.
 
-    Parameters
-    ----------
-    fit : Fit
-    freq_hz : ndarray, shape (n_freq,)
-        Rising, Hz.
-    shares : ndarray, shape (n_freq, p)
-        Share of each line.
+    Returns
+    -------
+    figure : Figure or None
+        Share of each part of the band; None for few lines.
+    table : Table or None
+        Frequencies below which a tenth, half and nine tenths lie.
     """
+    if not isinstance(fit.data, FitData):
+        return None, None
+    up = np.argsort(fit.freq_hz, kind="stable")
+    freq_hz, shares = fit.freq_hz[up], fit.data.information()[up]
     total = np.cumsum(shares, axis=0)
     rows: list[tuple[Cell, ...]] = []
     for i, term in enumerate(fit.parameters):
@@ -262,60 +242,35 @@ def information_table(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Tabl
         rows.append((shown_name(term), *(float(freq_hz[a]) for a in at)))
     columns = ("parameter", *(f"{100 * q:.0f} % below, Hz" for q in _QUANTILES))
     note = "Eight tenths of what the data say of a parameter lie between the first and the last frequency."
-    return Table("information-table", "Where the information lies", columns, tuple(rows), note=note)
+    table = Table("information-table", "Where the information lies", columns, tuple(rows), note=note)
+    return _information_figure(fit, freq_hz, shares), table
 
 
-def information_figure(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Figure | None:
+def _information_figure(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Figure | None:
     """Draw the share of each part of the band in what is known of the parameters of each DOF; None for few lines."""
     parts = min(_PARTS, freq_hz.size // _LEAST)
     if parts < 3 or freq_hz[-1] == freq_hz[0]:
         return None
     edges = np.linspace(freq_hz[0], freq_hz[-1], parts + 1)
+    steps = np.repeat(edges, 2)[1:-1]
     at = np.clip(np.searchsorted(edges, freq_hz, side="right") - 1, 0, parts - 1)
     panels = []
     for dof in fit.dofs:
         terms = [(i, term) for i, term in enumerate(fit.parameters) if term.row == term.column == dof]
         if not terms:
             continue
-        others = [term.kind for _, term in terms if term.kind not in _STYLES]
-        curves = tuple(
-            _steps(edges, np.bincount(at, shares[:, i], parts).astype(np.float64), term, others) for i, term in terms
-        )
-        panels.append(Panel(f"DOF {dof}", FREQUENCY, f"share of the band in {parts} parts, %", curves))
+        styles, curves = iter(_OTHERS * len(terms)), list[Curve]()
+        for i, term in terms:
+            share = 100 * np.bincount(at, shares[:, i], parts)
+            style = _STYLES.get(term.kind) or next(styles)
+            curves.append(Curve(_LABELS.get(term.kind, term.kind), steps, np.repeat(share, 2), style))
+        panels.append(Panel(f"DOF {dof}", FREQUENCY, f"share of the band in {parts} parts, %", tuple(curves)))
     caption = "Information density: how much each part of the band says about each parameter"
     return Figure("information", caption, tuple(panels), 2 if len(panels) > 1 else 1)
 
 
-def _steps(edges: FloatArray, share: FloatArray, term: FittedParameter, others: list[str]) -> Curve:
-    """Draw shares as steps; `others` are the kinds of this DOF that springs and dampers do not have."""
-    style = _STYLES.get(term.kind) or _OTHERS[others.index(term.kind) % len(_OTHERS)]
-    return Curve(_LABELS.get(term.kind, term.kind), np.repeat(edges, 2)[1:-1], np.repeat(100 * share, 2), style)
-
-
 #: FRFs that are drawn, two beside each other.
 _FRFS = 4
-
-
-def fit_overview(fit: Fit) -> Figure:
-    """Return K* and compliance of each DOF, and the first FRFs where the fit holds them, as one figure."""
-    panels: list[Panel] = []
-    for figure in fit_figures(fit):
-        dof = figure.key.removeprefix("joint_")
-        titles = (f"DOF {dof}: joint stiffness", "", f"DOF {dof}: joint compliance", "")
-        panels += [replace(panel, title=title) for panel, title in zip(figure.panels, titles, strict=True)]
-    if fit.data is not None:
-        up = np.argsort(fit.freq_hz, kind="stable")
-        compared = compare_frfs(fit.data, fit.dofs) if isinstance(fit.data, FitData) else compare_model(fit)
-        frfs = frf_figures(compared, fit.freq_hz, up)[:_FRFS]
-        for first in range(0, len(frfs), 2):
-            beside = frfs[first : first + 2]
-            for part in zip(*(figure.panels for figure in beside), strict=True):
-                own = [
-                    replace(panel, title=figure.caption if panel.log_y else "")
-                    for panel, figure in zip(part, beside, strict=True)
-                ]
-                panels += [*own, *([Panel("", "", "")] * (2 - len(own)))]
-    return Figure("joint", "Joint found", tuple(panels), 2)
 
 
 def plot(fit: Fit) -> Any:
@@ -337,4 +292,19 @@ def plot(fit: Fit) -> Any:
         matplotlib is missing.
     """
     check_type("fit", fit, Fit)
-    return laid_out(fit_overview(fit))
+    panels: list[Panel] = []
+    for figure in fit_figures(fit):
+        dof = figure.key.removeprefix("joint_")
+        titles = (f"DOF {dof}: joint stiffness", "", f"DOF {dof}: joint compliance", "")
+        panels += [replace(panel, title=title) for panel, title in zip(figure.panels, titles, strict=True)]
+    if fit.data is not None:
+        frfs = frf_figures(compare_fit(fit), fit.freq_hz)[:_FRFS]
+        for first in range(0, len(frfs), 2):
+            beside = frfs[first : first + 2]
+            for part in zip(*(figure.panels for figure in beside), strict=True):
+                own = [
+                    replace(panel, title=figure.caption if panel.log_y else "")
+                    for panel, figure in zip(part, beside, strict=True)
+                ]
+                panels += [*own, *([Panel("", "", "")] * (2 - len(own)))]
+    return laid_out(Figure("joint", "Joint found", tuple(panels), 2))

@@ -1,4 +1,4 @@
-"""Measured FRFs against those regenerated with the joint, and maps of what is left, by channel."""
+"""Measured FRFs against those regenerated or predicted with the joint, and maps of agreement and residual."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from jointfrf.workbench.report.document import HeatMap
 from jointfrf.workbench.report.figure import Curve, Figure
 from jointfrf.workbench.report.receptance import ReceptanceCurve, receptance_panels
 
-__all__ = ["ComparedFrfs", "compare_frfs", "compare_model", "frf_figures", "reciprocity_map", "residual_map"]
+__all__ = ["ComparedFrfs", "assurance", "compare_fit", "frf_figures", "frf_maps"]
 
 #: FRFs that are drawn at most.
 _MOST = 24
@@ -26,6 +26,10 @@ _MOST = 24
 _NO_NOISE = 1e-9
 #: Values from which on cells of a map are shaded, and of the darkest unless some are larger.
 _LIGHT, _DARK = 1.0, 10.0
+#: Agreement from which on a cell is shaded, and that of the darkest.
+_AGREES, _DIFFERS = 0.95, 0.6
+#: Parts of the band in the map of the residual, and lines that each holds at least.
+_PARTS, _LEAST_LINES = 8, 8
 #: An FRF has signal where its mean square is above so many times that of its noise, which has 1; lines that are asked.
 _SIGNAL, _ASKED = 2.0, 200
 #: Share of the differences that may lie below a panel.
@@ -75,7 +79,12 @@ class ComparedFrfs:
         return int(np.argmax(np.where(np.isfinite(left), left, -1.0)))
 
 
-def compare_frfs(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
+def compare_fit(fit: Fit) -> ComparedFrfs:
+    """Compare the FRFs of a fit with those that the joint found, with the models if there are any, predicts."""
+    return _compare_joint(fit.data, fit.dofs) if isinstance(fit.data, FitData) else _compare_model(fit)
+
+
+def _compare_joint(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
     """Regenerate the FRFs of a fit, a piece of the lines at a time, and compare them with the measured ones."""
     same = data.responses.shape == data.forces.shape and np.array_equal(data.responses, data.forces)
     modes = data.modes
@@ -140,7 +149,7 @@ def _above_noise(squares: NDArray[np.floating], variance: NDArray[np.floating]) 
     return np.asarray(loud if loud.any() else known.any(axis=0), np.bool_)
 
 
-def compare_model(fit: Fit) -> ComparedFrfs:
+def _compare_model(fit: Fit) -> ComparedFrfs:
     """Compare the FRFs of a fit of an assembly with those that its models and the joint predict."""
     data = fit.data
     assert isinstance(data, ModelData)
@@ -195,9 +204,9 @@ def _evenly(pairs: Sequence[tuple[int, int]], most: int) -> list[tuple[int, int]
     return [pairs[round(i * (len(pairs) - 1) / max(count - 1, 1))] for i in range(count)]
 
 
-def frf_figures(compared: ComparedFrfs, freq_hz: FloatArray, up: NDArray[np.intp]) -> list[Figure]:
-    """Return modulus and phase of each FRF that is drawn; `up` puts the lines in rising order."""
-    figures = []
+def frf_figures(compared: ComparedFrfs, freq_hz: FloatArray) -> list[Figure]:
+    """Return modulus and phase of each FRF that is drawn."""
+    figures, up = [], np.argsort(freq_hz, kind="stable")
     for i, (p, q) in enumerate(compared.entries):
         names = (compared.rows[p], compared.columns[q])
         ends = [name.rpartition(":")[2].lstrip("+-") for name in names]
@@ -225,6 +234,20 @@ def _limits(curves: tuple[Curve, ...], difference: FloatArray) -> tuple[float, f
     return low / 1.5, 1.5 * float(values.max())
 
 
+def frf_maps(fit: Fit, compared: ComparedFrfs) -> list[HeatMap]:
+    """Return maps by response and force: residual, and agreement or reciprocity where they are known."""
+    if isinstance(fit.data, ModelData):
+        return [assurance_map(fit), residual_map(compared), band_map(fit)]
+    return [one for one in (residual_map(compared), reciprocity_map(compared)) if one]
+
+
+def _map(compared: ComparedFrfs, key: str, title: str, values: FloatArray, note: str) -> HeatMap:
+    return HeatMap(
+        key, f"{title}, in units of the noise", "response \\ force", compared.rows, compared.columns, values, _LIGHT,
+        _DARK, note, log=True,
+    )  # fmt: skip
+
+
 def residual_map(compared: ComparedFrfs) -> HeatMap:
     """Return the map of what is left by response and force."""
     where = "channel" if compared.of_channels else "joint DOF"
@@ -234,20 +257,14 @@ def residual_map(compared: ComparedFrfs) -> HeatMap:
             "1 is noise. A row or a column well above 1 is a channel that does not fit: gain, place, direction, or a "
             "part of the model near it."
         )
-        return HeatMap(
-            "residual-map", "Residual by channel, in units of the noise", "response \\ force", compared.rows,
-            compared.columns, compared.residual, _LIGHT, _DARK, note, log=True,
-        )  # fmt: skip
-    note = (
-        "Root mean square of measured minus regenerated over the lines used, in units of the noise of the FRF, or of "
-        "rigid motion there if that has more. About 1 or below is noise. A row and a column well above 1 are a channel "
-        "that does not fit (gain, place, direction); the rows and columns of a side, one whose channels do not move "
-        "as a rigid body."
-    )
-    return HeatMap(
-        "residual-map", f"Residual by {where}, in units of the noise", "response \\ force", compared.rows,
-        compared.columns, compared.residual, _LIGHT, _DARK, note, log=True,
-    )  # fmt: skip
+    else:
+        note = (
+            "Root mean square of measured minus regenerated over the lines used, in units of the noise of the FRF, or "
+            "of rigid motion there if that has more. About 1 or below is noise. A row and a column well above 1 are a "
+            "channel that does not fit (gain, place, direction); the rows and columns of a side, one whose channels do "
+            "not move as a rigid body."
+        )
+    return _map(compared, "residual-map", f"Residual by {where}", compared.residual, note)
 
 
 def reciprocity_map(compared: ComparedFrfs) -> HeatMap | None:
@@ -258,7 +275,69 @@ def reciprocity_map(compared: ComparedFrfs) -> HeatMap | None:
         "Root mean square of h_pq - h_qp in units of its noise: 1 is noise. A row well above 1 is a response and a "
         "force that are not at one place or in one direction."
     )
+    return _map(compared, "reciprocity-map", "Reciprocity", compared.reciprocity, note)
+
+
+def assurance(measured: ComplexArray, predicted: ComplexArray) -> FloatArray:
+    """Return the frequency response assurance criterion of each FRF, shape (n_o, n_i).
+
+    Parameters
+    ----------
+    measured, predicted : ndarray, shape (n_freq, n_o, n_i)
+        NaN where nothing was measured.
+
+    Returns
+    -------
+    ndarray
+        FRAC = |sum m conj(p)|^2 / (sum |m|^2 sum |p|^2) over the lines, from 0 to 1; a constant factor does not change
+        it. NaN where nothing was measured.
+
+    References
+    ----------
+    W. Heylen, S. Lammens, FRAC: a consistent way of comparing frequency response functions, Proc. Int. Conf. on
+    Identification in Engineering Systems, Swansea 1996, 48-57; R. J. Allemang, The modal assurance criterion - twenty
+    years of use and abuse, Sound and Vibration 37 (2003) no. 8, 14-23.
+    """
+    known = np.isfinite(measured) & np.isfinite(predicted)
+    m, p = np.where(known, measured, 0), np.where(known, predicted, 0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found = abs((m * p.conj()).sum(axis=0)) ** 2 / ((abs(m) ** 2).sum(axis=0) * (abs(p) ** 2).sum(axis=0))
+    return np.asarray(found, float)
+
+
+def assurance_map(fit: Fit) -> HeatMap:
+    """Return the map of FRAC by response and force."""
+    data = fit.data
+    assert isinstance(data, ModelData)
+    note = (
+        "Frequency response assurance criterion |Σ m p*|² / (Σ |m|² Σ |p|²) of measured m and predicted p over the "
+        "lines used (Heylen and Lammens 1996): 1 where they differ by a constant factor only. Peaks weigh most."
+    )
     return HeatMap(
-        "reciprocity-map", "Reciprocity, in units of the noise", "response \\ force", compared.rows, compared.columns,
-        compared.reciprocity, _LIGHT, _DARK, note, log=True,
+        "frac-map", "Agreement of each FRF (FRAC)", "response \\ force", fit.responses, fit.forces,
+        assurance(data.measured, data.predicted), _AGREES, _DIFFERS, note, 3,
+    )  # fmt: skip
+
+
+def band_map(fit: Fit) -> HeatMap:
+    """Return the map of the residual by channel and part of the band."""
+    data = fit.data
+    assert isinstance(data, ModelData)
+    up = np.argsort(fit.freq_hz, kind="stable")
+    parts = np.array_split(up, max(1, min(_PARTS, fit.freq_hz.size // _LEAST_LINES)))
+    squares, known = np.nan_to_num(abs(data.residual) ** 2), np.isfinite(data.residual)
+    rows = [*(f"response {name}" for name in fit.responses), *(f"force {name}" for name in fit.forces)]
+    values = []
+    for axis, names in ((2, fit.responses), (1, fit.forces)):
+        for i in range(len(names)):
+            own = [np.take(part.sum(axis=axis), i, axis=1) for part in (squares, known)]
+            with np.errstate(invalid="ignore", divide="ignore"):
+                values.append([float(np.sqrt(own[0][part].sum() / own[1][part].sum())) for part in parts])
+    columns = [f"{fit.freq_hz[part[0]]:.4g}–{fit.freq_hz[part[-1]]:.4g} Hz" for part in parts]
+    note = (
+        "Root mean square in units of the noise. A column well above 1 is a part of the band where the models are off."
+    )
+    return HeatMap(
+        "residual-band-map", "Residual by channel and band, in units of the noise", "channel \\ band", rows, columns,
+        np.array(values), _LIGHT, _DARK, note, log=True,
     )  # fmt: skip

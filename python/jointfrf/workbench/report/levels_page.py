@@ -2,33 +2,27 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from jointfrf.dofs import is_rotation
-from jointfrf.files import write_file
-from jointfrf.kernel.arguments import check_type
+from jointfrf.kernel.arguments import FloatArray, check_type
 from jointfrf.workbench.amplitude.decay import ModalDecay
 from jointfrf.workbench.amplitude.levels import JointLevel, JointLevels
-from jointfrf.workbench.report.decay_figure import modal_decay_figure
 from jointfrf.workbench.report.document import (
     Document,
-    Picture,
     Section,
     Words,
-    make_document,
     section_of_command,
     words_of_findings,
+    write_document,
 )
-from jointfrf.workbench.report.draw import draw
 from jointfrf.workbench.report.figure import Curve, Figure, Panel, Ribbon
-from jointfrf.workbench.report.table import Table, csv_cell
+from jointfrf.workbench.report.table import Table, csv_text
 
-__all__ = ["levels_csv", "levels_figure", "write_levels"]
+__all__ = ["levels_csv", "levels_figure", "modal_decay_figure", "write_levels"]
 
 
 def _units(dof: str) -> tuple[str, str]:
@@ -49,16 +43,44 @@ def levels_figure(found: JointLevels, dof: str) -> Figure:
     for name, unit in (("stiffness", f"{load}/{motion}"), ("loss factor", "1")):
         attribute = name.replace(" ", "_")
         values = [getattr(one, attribute) for one in own]
-        low, value, high = (np.array([getattr(one, part) for one in values]) for part in ("low", "value", "high"))
+        limits = [np.array([getattr(one, part) for one in values]) for part in ("low", "value", "high")]
         for label, x, x_law in axes:
-            order = np.argsort(x)
-            curves = [Curve("found", x[order], value[order], "ismm-points")]
-            curves += [] if law is None else [Curve(name_of_law, x_law, getattr(law, attribute), "actual")]
-            ribbon = Ribbon(f"{100 * found.probability:g} %", x[order], low[order], high[order], "ismm")
+            curves = [] if law is None else [Curve(name_of_law, x_law, getattr(law, attribute), "actual")]
             below = label if attribute == "loss_factor" else ""
-            panels.append(Panel("", below, f"{name}, {unit}", tuple(curves), (ribbon,), log_x=True))
+            panels.append(_panel(below, f"{name}, {unit}", x, limits, f"{100 * found.probability:g} %", *curves))
     caption = f"{dof}: stiffness and loss factor over the relative motion in the joint and over its force, peak values"
     return Figure(f"levels-{dof}", caption, tuple(panels), columns=2)
+
+
+def _panel(
+    x_label: str, y_label: str, x: FloatArray, limits: Sequence[FloatArray], interval: str, *law: Curve
+) -> Panel:
+    """Draw low, value and high over an amplitude, in any order of the values."""
+    order = np.argsort(x)
+    low, value, high = (own[order] for own in limits)
+    curves, ribbon = (
+        (Curve("found", x[order], value, "ismm-points"), *law),
+        Ribbon(interval, x[order], low, high, "ismm"),
+    )
+    return Panel("", x_label, y_label, curves, (ribbon,), log_x=True)
+
+
+#: Standard errors of a 95 % interval.
+_QUANTILE = 1.96
+
+
+def modal_decay_figure(mode: ModalDecay) -> Figure:
+    """Return frequency and damping over the amplitude of the sensor that moves most, with 95 % intervals."""
+    strongest = int(np.nanargmax(np.nanmean(mode.amplitude, axis=0)))
+    known, name = np.isfinite(mode.amplitude[:, strongest]), mode.sensors[strongest]
+    panels = []
+    for label, value, error in zip(
+        ("frequency, Hz", "damping ratio, 1"), (mode.freq_hz, mode.damping), mode.errors, strict=True
+    ):
+        limits = [(value * (1 + reach * error))[known] for reach in (-_QUANTILE, 0.0, _QUANTILE)]
+        panels.append(_panel(f"amplitude of {name}, m", label, mode.amplitude[known, strongest], limits, "95 %"))
+    caption = f"Mode at {mode.name}: frequency and damping over the peak displacement of {name}"
+    return Figure(f"decay-{mode.name.replace(' ', '-')}", caption, tuple(panels), columns=2)
 
 
 def write_levels(found: JointLevels, path: Path | str, *, command: str = "", modes: Sequence[ModalDecay] = ()) -> Path:
@@ -90,23 +112,16 @@ def write_levels(found: JointLevels, path: Path | str, *, command: str = "", mod
     figures = [*map(modal_decay_figure, modes), *(levels_figure(found, dof) for dof in found.levels)]
     left_out = [f"Left out: {test}. {why}" for test, why in found.left_out.items()]
     sections = [
-        Section(
-            "summary",
-            "Summary",
-            [
-                *([Words(left_out, "warnings")] if left_out else []),
-                Words(list(_sentences(found))),
-                *words_of_findings(found.findings),
-            ],
-        ),
-        Section("levels", "Over amplitude", [Picture(one, draw(one)) for one in figures]),
+        Section("summary", "Summary", [
+            Words(left_out, "warnings"), Words(list(_sentences(found))), *words_of_findings(found.findings),
+        ]),
+        Section("levels", "Over amplitude", figures),
         Section("tables", "Tables", [table for dof in found.levels for table in _tables(found, dof)]),
         section_of_command(command),
-    ]
+    ]  # fmt: skip
     count = max(map(len, found.levels.values()))
     about = f"Stiffness and loss factor of {', '.join(found.levels)} over the amplitude of the motion in the joint."
-    write_file(Path(path), make_document(Document(f"A joint at {count} levels", about, sections)))
-    return Path(path)
+    return write_document(Document(f"A joint at {count} levels", about, sections), path)
 
 
 def _sentences(found: JointLevels) -> Iterator[str]:
@@ -154,10 +169,6 @@ def _row(one: JointLevel) -> tuple[str | float, ...]:
 
 def levels_csv(found: JointLevels) -> str:
     """Write a line for each level of each DOF: a table of secant stiffness and loss factor."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("dof", "test", "amplitude", "lowest", "highest", "force", "k", "k_low", "k_high", "loss_factor",
-                     "loss_factor_low", "loss_factor_high", "order"))  # fmt: skip
-    for dof, own in found.levels.items():
-        writer.writerows(map(csv_cell, (dof, *_row(one))) for one in own)
-    return text.getvalue()
+    columns = ("dof", "test", "amplitude", "lowest", "highest", "force", "k", "k_low", "k_high", "loss_factor",
+               "loss_factor_low", "loss_factor_high", "order")  # fmt: skip
+    return csv_text([columns, *((dof, *_row(one)) for dof, own in found.levels.items() for one in own)])

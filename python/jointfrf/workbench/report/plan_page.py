@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from jointfrf.dofs import Parameter
-from jointfrf.files import write_file
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.workbench.planning.joint_frfs import JointFrfPlan
 from jointfrf.workbench.planning.plan import MeasurementPlan
@@ -16,14 +15,12 @@ from jointfrf.workbench.report.document import (
     Document,
     HeatMap,
     Part,
-    Picture,
     Section,
     Words,
-    make_document,
     section_of_command,
     words_of_findings,
+    write_document,
 )
-from jointfrf.workbench.report.draw import draw
 from jointfrf.workbench.report.figure import Curve, Figure, Level, Panel
 from jointfrf.workbench.report.sketch import SketchedPart, assembly_sketch
 from jointfrf.workbench.report.table import Cell, Table
@@ -88,8 +85,7 @@ def write_plan(
     if not isinstance(plan, MeasurementPlan | JointFrfPlan):
         raise TypeError(f"plan must be a MeasurementPlan or a JointFrfPlan, not {type(plan).__name__}")
     document = _of_joint_frfs(plan, command) if isinstance(plan, JointFrfPlan) else _document(plan, parts, command)
-    write_file(Path(path), make_document(document))
-    return Path(path)
+    return write_document(document, path)
 
 
 def _of_joint_frfs(plan: JointFrfPlan, command: str) -> Document:
@@ -102,12 +98,12 @@ def _of_joint_frfs(plan: JointFrfPlan, command: str) -> Document:
         for name, value in plan.value.items()
     )  # fmt: skip
     terms = map(Parameter.parse, plan.value)
-    lines, dofs = line_figure(plan), [one.row for one in terms if one.kind == "k"]
+    dofs = [one.row for one in terms if one.kind == "k"]
     names = [f"{side}:{dof}" for side in "jk" for dof in dofs]
     maps = list(_shares(tuple(plan.value), names, names, plan.frf_share, "what all know"))
     sections = [
         Section("summary", "What the test will know", [Table("targets", "", (*columns, *shift), rows)]),
-        Section("lines", "Where the knowledge lies", [Picture(lines, draw(lines)), *maps]),
+        Section("lines", "Where the knowledge lies", [line_figure(plan), *maps]),
         section_of_command(command),
     ]
     first, last = plan.freq_hz[[0, -1]].tolist()
@@ -117,13 +113,12 @@ def _of_joint_frfs(plan: JointFrfPlan, command: str) -> Document:
 
 def _document(plan: MeasurementPlan, parts: Sequence[SketchedPart], command: str) -> Document:
     best = plan.proposed
-    cost, lines = cost_figure(plan), line_figure(plan)
     sketch = assembly_sketch(parts, best.sensors, best.hits) if parts else None
     maps = _shares(plan.targets, plan.responses, plan.forces, plan.frf_share, "what all candidates would know")
     sections = [
-        Section("summary", "The test", [*_said(plan), *([sketch] if sketch else []), _targets(plan)]),
-        Section("cost", "What more would bring", [Picture(cost, draw(cost)), _steps(plan), _additions(plan)]),
-        Section("lines", "Where the knowledge lies", [Picture(lines, draw(lines)), *maps]),
+        Section("summary", "The test", [*_said(plan), sketch, _targets(plan)]),
+        Section("cost", "What more would bring", [cost_figure(plan), _steps(plan), _additions(plan)]),
+        Section("lines", "Where the knowledge lies", [line_figure(plan), *maps]),
         section_of_command(command),
     ]
     about = (

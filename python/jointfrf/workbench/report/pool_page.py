@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator
 from pathlib import Path
 
-from jointfrf.files import write_file
 from jointfrf.kernel.arguments import check_type
 from jointfrf.workbench.pooling.parameter import Estimate, FactorSpread, FactorTrend, PooledParameter, shown_chance
 from jointfrf.workbench.pooling.pool import PooledFits, place_of
 from jointfrf.workbench.report.axes import prefixed_unit
 from jointfrf.workbench.report.document import (
     Document,
-    Picture,
     Section,
     Words,
-    make_document,
     section_of_command,
     words_of_findings,
+    write_document,
 )
-from jointfrf.workbench.report.draw import draw
 from jointfrf.workbench.report.figure import Figure, Interval, Level, Panel
-from jointfrf.workbench.report.table import Table, csv_cell, without_repeats
+from jointfrf.workbench.report.table import Table, csv_text, without_repeats
 
 __all__ = ["forest_figure", "pool_csv", "write_pool"]
 
@@ -78,15 +73,14 @@ def write_pool(pooled: PooledFits, path: Path | str, *, command: str = "") -> Pa
         The file cannot be written.
     """
     check_type("pooled", pooled, PooledFits)
-    write_file(Path(path), make_document(_document(pooled, command)))
-    return Path(path)
+    return write_document(_document(pooled, command), path)
 
 
 def _document(pooled: PooledFits, command: str) -> Document:
     figures = [forest_figure(one, pooled.probability) for one in pooled.parameters.values()]
     sections = [
         Section("summary", "Summary", [Words(list(_sentences(pooled))), *words_of_findings(pooled.findings)]),
-        Section("forest", "Fits, mean, and the next assembly", [Picture(one, draw(one)) for one in figures]),
+        Section("forest", "Fits, mean, and the next assembly", figures),
         Section("tables", "Tables", [_mean_table(pooled), _spread_table(pooled), _trend_table(pooled)]),
         section_of_command(command),
     ]
@@ -143,9 +137,7 @@ def _trend_table(pooled: PooledFits) -> Table:
 
 def pool_csv(pooled: PooledFits) -> str:
     """Write a line for each fit, the mean, the next assembly, spreads and trends of each parameter."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("parameter", "unit", "what", "of", "value", "low", "high", "p"))
+    rows: list[tuple[object, ...]] = [("parameter", "unit", "what", "of", "value", "low", "high", "p")]
     for one in pooled.parameters.values():
         lines: list[tuple[str, str, Estimate | FactorSpread | FactorTrend, object]] = [
             *(("fit", label, own, "") for label, own in zip(one.labels, one.estimates, strict=True)),
@@ -153,7 +145,5 @@ def pool_csv(pooled: PooledFits) -> str:
             *(("spread", own.factor, own, own.p_value) for own in one.spreads),
             *(("trend", own.factor, own, own.p_value) for own in one.trends),
         ]  # fmt: skip
-        for what, of, own, chance in lines:
-            cells = (one.name, one.unit, what, of, own.value, own.low, own.high, chance)
-            writer.writerow(map(csv_cell, cells))
-    return text.getvalue()
+        rows += [(one.name, one.unit, what, of, own.value, own.low, own.high, p) for what, of, own, p in lines]
+    return csv_text(rows)

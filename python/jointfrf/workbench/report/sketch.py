@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from jointfrf.channels.point_lines import Interface
 from jointfrf.dofs import DIRECTIONS, direction_names, rigid_motion
@@ -43,6 +42,10 @@ _HEADS = "".join(
     f'refY="3.2" stroke="none"><path class="{style}" stroke="none" d="M0 0L8 3.2 0 6.4z"/></marker>'
     for style in ("j", "k", "axis")
 )
+#: How far parts are drawn apart where they meet, each way.
+_LIFT = 9.0
+#: Nodes of a part that are drawn at most: more are a grey body.
+_MOST_NODES = 400
 #: Points nearer than this share of the extent count as one place.
 _SAME = 1e-6
 #: Directions that differ by less are one.
@@ -53,7 +56,6 @@ _INDEPENDENT = 0.1
 _APART = 30.0
 
 
-_OnPage = Callable[[FloatArray, int], FloatArray]
 #: Left, top, right and bottom of what is drawn already.
 _Box = tuple[float, float, float, float]
 
@@ -157,157 +159,128 @@ def _axis(direction: FloatArray, axis: FloatArray) -> str:
     return kind + "(" + " ".join(f"{x:.2g}" for x in direction) + ")"
 
 
-def _fitted(flat: FloatArray) -> tuple[FloatArray, float, float]:
-    """Return the middle of points of a drawing, the scale at which they fill it, and its height."""
-    extent = np.ptp(flat, axis=0)
-    sizes = [(size - 2 * _MARGIN) / max(e, _SAME) for size, e in zip((_WIDTH, _HIGH), extent, strict=True)]
-    scale = min(sizes) if extent.max() > _SAME else 1.0
-    height = float(np.clip(extent[1] * scale + 2 * _MARGIN, _LOW, _HIGH))
-    return (flat.min(axis=0) + flat.max(axis=0)) / 2, scale, height
+class _Scene:
+    """A sketch in the making: what is drawn, which places are taken, and the names that are still to be written."""
 
+    def __init__(self, places: FloatArray, view: FloatArray = _VIEW) -> None:
+        flat = places @ view.T
+        extent = np.ptp(flat, axis=0)
+        sizes = [(size - 2 * _MARGIN) / max(e, _SAME) for size, e in zip((_WIDTH, _HIGH), extent, strict=True)]
+        self.view, self.middle = view, (flat.min(axis=0) + flat.max(axis=0)) / 2
+        self.scale = min(sizes) if extent.max() > _SAME else 1.0
+        self.height = float(np.clip(extent[1] * self.scale + 2 * _MARGIN, _LOW, _HIGH))
+        self.corner = np.array([_CORNER[0], self.height - _CORNER[1]])
+        self.drawn: list[str] = []
+        self.names: dict[str, FloatArray] = {}
+        self.taken: list[_Box] = [(0.0, self.corner[1] - 1.6 * _AXIS, self.corner[0] + 1.6 * _AXIS, self.height)]
 
-def _pair(spot: FloatArray) -> tuple[float, float]:
-    return float(spot[0]), float(spot[1])
+    def at(self, place: FloatArray, down: float = 0.0) -> FloatArray:
+        """Return the spot on the page of a place in space, drawn so much lower."""
+        right, up = (place @ self.view.T - self.middle) * self.scale
+        return np.array([_WIDTH / 2 + right, self.height / 2 - up + down])
 
+    def step(self, direction: FloatArray) -> FloatArray:
+        """Return a direction in space on the page."""
+        return np.asarray((self.view @ direction) * (1, -1), np.float64)
 
-def _box(x: float, y: float, half: float) -> _Box:
-    return (x - half, y - half, x + half, y + half)
+    def cover(self, spot: FloatArray, half: float) -> None:
+        """Keep names away from a spot."""
+        x, y = spot.tolist()
+        self.taken.append((x - half, y - half, x + half, y + half))
 
+    def arrow(self, style: str, spot: FloatArray, step: FloatArray) -> None:
+        shaft = f"M{spot[0]:.1f} {spot[1]:.1f}l{step[0]:.1f} {step[1]:.1f}"
+        self.drawn.append(
+            f'<path class="{style} link" stroke-width="1.6" marker-end="url(#head-{style})" d="{shaft}"/>'
+        )
+        for part in np.linspace(0, 1, 6):
+            self.cover(spot + part * step, 4.0)
 
-def _boxes_along(x: float, y: float, step: FloatArray) -> list[_Box]:
-    """Return boxes that cover an arrow."""
-    return [_box(x + part * float(step[0]), y + part * float(step[1]), 4.0) for part in np.linspace(0, 1, 6)]
+    def spring(self, first: FloatArray, last: FloatArray) -> None:
+        step = last - first
+        length = max(float(np.hypot(*step)), 1.0)
+        place = ", ".join(f"{x:.3f}" for x in (*step, -step[1] / length, step[0] / length, *first))
+        look = 'stroke-width="1.6" stroke-linejoin="round" vector-effect="non-scaling-stroke"'
+        self.drawn.append(f'<path class="joint open" {look} transform="matrix({place})" d="{_SPRING}"/>')
 
+    def finished(self, key: str, caption: str, alt: str) -> Sketch:
+        """Write the names and draw the axes of space in the corner."""
+        left = sum(not self._write(name, spot) for name, spot in self.names.items())
+        for letter, direction in zip("xyz", self.view.T, strict=True):
+            step = direction * (1, -1) * _AXIS
+            x, y = self.corner + 1.38 * step
+            self.arrow("axis", self.corner, step)
+            self.drawn.append(
+                f'<text x="{x:.1f}" y="{y + 4:.1f}" text-anchor="middle" font-style="italic">{letter}</text>'
+            )
+        if left:
+            caption += (
+                f"; {left} name{'s' if left > 1 else ''} without room for {'them' if left > 1 else 'it'} left out"
+            )
+        # Arrows of sides that are drawn apart reach a little above the margin.
+        box = f'viewBox="0 -6 {_WIDTH:g} {self.height + 6:g}"'
+        svg = f'<svg {box} aria-hidden="true"><defs>{_HEADS}</defs>{"".join(self.drawn)}</svg>'
+        return Sketch(key, svg, caption, alt)
 
-def _names(wanted: Mapping[str, tuple[float, float]], taken: list[_Box], height: float) -> tuple[str, str]:
-    """Write names beside their places where they overprint nothing; say how many find no such place."""
-    drawn, left = [], 0
-    for text, (x, y) in wanted.items():
-        half_width, half_height = _FONT * _LETTER * len(text) / 2, _FONT / 2
+    def _write(self, name: str, spot: FloatArray) -> bool:
+        """Write a name beside its spot where it overprints nothing; return whether there is such a place."""
+        x, y = spot.tolist()
+        half_width, half_height = _FONT * _LETTER * len(name) / 2, _FONT / 2
         for distance, (right, down) in ((d, way) for d in _DISTANCES for way in _AROUND):
             a, b = x + right * (distance + half_width), y + down * (distance + half_height)
             box = (a - half_width, b - half_height, a + half_width, b + half_height)
-            is_inside = box[0] >= 0 and box[1] >= 0 and box[2] <= _WIDTH and box[3] <= height
-            if is_inside and not any(_overlap(box, one) for one in taken):
+            is_inside = box[0] >= 0 and box[1] >= 0 and box[2] <= _WIDTH and box[3] <= self.height
+            if is_inside and not any(_overlap(box, one) for one in self.taken):
                 break
         else:
-            left += 1
-            continue
-        taken.append(box)
+            return False
+        self.taken.append(box)
+        start = a - right * half_width
         if distance > _DISTANCES[0]:
-            near = (a - right * half_width, b - down * half_height)
-            drawn.append(f'<path class="leader" d="M{x:.1f} {y:.1f}L{near[0]:.1f} {near[1]:.1f}"/>')
+            leader = f"M{x:.1f} {y:.1f}L{start:.1f} {b - down * half_height:.1f}"
+            self.drawn.append(f'<path class="leader" d="{leader}"/>')
         # Smaller letters, on a wide screen, stay near their place.
-        start, anchor = a - right * half_width, ("middle", "start", "end")[right]
-        base = y - distance if down < 0 else b + 0.35 * _FONT
-        drawn.append(f'<text x="{start:.1f}" y="{base:.1f}" text-anchor="{anchor}">{escape(text)}</text>')
-    said = (
-        f"; {left} name{'s' if left > 1 else ''} without room for {'them' if left > 1 else 'it'} left out"
-        if left
-        else ""
-    )
-    return "".join(drawn), said
+        anchor, base = ("middle", "start", "end")[right], y - distance if down < 0 else b + 0.35 * _FONT
+        self.drawn.append(f'<text x="{start:.1f}" y="{base:.1f}" text-anchor="{anchor}">{escape(name)}</text>')
+        return True
 
 
 def _overlap(one: _Box, other: _Box) -> bool:
     return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
-def _as_svg(drawn: Sequence[str], height: float) -> str:
-    # Arrows of sides that are drawn apart reach a little above the margin.
-    content = "".join(drawn)
-    return f'<svg viewBox="0 -6 {_WIDTH:g} {height + 6:g}" aria-hidden="true"><defs>{_HEADS}</defs>{content}</svg>'
-
-
 def interface_sketch(interface: Interface, points: list[InterfacePoint], dofs: tuple[str, ...]) -> Sketch:
     """Draw the points of both sides with their directions, and the joint between the reference points."""
-    places = np.array([p.place for p in points] + list(interface.references))
-    flat = places @ _VIEW.T
-    middle, scale, height = _fitted(flat)
-
+    scene, side_of = _Scene(np.array([p.place for p in points] + list(interface.references))), [p.side for p in points]
+    flat, side = np.array([scene.at(p.place) for p in points]), np.array(side_of)
     # Sides that lie on each other are drawn apart.
-    near = _nearest(flat[: len(points)] * scale, np.array([p.side for p in points]))
-    shift = _APART if near < _APART else 0.0
-
-    def at(place: FloatArray, side: int) -> FloatArray:
-        right, up = (place @ _VIEW.T - middle) * scale
-        return np.array([_WIDTH / 2 + right, height / 2 - up + (side - 0.5) * 2 * shift])
-
-    ends = [at(reference, side) for side, reference in enumerate(interface.references)]
-    taken = [_corner_box(height), *(_box(*_pair(end), 10.0) for end in (*ends, (ends[0] + ends[1]) / 2))]
-    drawn = [_links(points, at, side, ends[side]) for side in (0, 1)]
-    drawn += [_point(p, at, taken) for p in points]
-    names: dict[str, tuple[float, float]] = {}
-    for p in points:
-        names[p.name] = _pair(at(p.place, p.side))
-    text, left_out = _names(names, taken, height)
-    drawn += [_spring(*ends), _axes(height), text]
-    sides = [", ".join(p.name for p in points if p.side == side) for side in (0, 1)]
+    between = np.linalg.norm(flat[side == 0][:, None] - flat[side == 1][None], axis=2)
+    shift = _APART if between.min(initial=np.inf) < _APART else 0.0
+    spots = flat + np.stack([np.zeros(side.size), shift * (2 * side - 1)], axis=1)
+    ends = [scene.at(reference, shift * (2 * i - 1)) for i, reference in enumerate(interface.references)]
+    for spot in (*ends, (ends[0] + ends[1]) / 2):
+        scene.cover(spot, 10.0)
+    for i, end in enumerate(ends):
+        path = "".join(f"M{end[0]:.1f} {end[1]:.1f}L{x:.1f} {y:.1f}" for x, y in spots[side == i])
+        look = f'stroke-width="1.2" stroke-dasharray="{("none", "5 3")[i]}"'
+        scene.drawn.append(f'<path class="{"jk"[i]} link" {look} d="{path}"/>')
+    for p, spot in zip(points, spots, strict=True):
+        style, place = "jk"[p.side], f'cx="{spot[0]:.1f}" cy="{spot[1]:.1f}"'
+        scene.drawn.append(f'<circle class="{style}{" open" if p.side else ""}" {place} r="4.5" stroke-width="2"/>')
+        scene.cover(spot, 6.0)
+        for direction in p.directions:
+            scene.arrow(style, spot, scene.step(direction) * _ARROW)
+        scene.names[p.name] = spot
+    scene.spring(*ends)
+    sides = [", ".join(p.name for p in points if p.side == i) for i in (0, 1)]
     apart = 1e3 * float(np.linalg.norm(interface.references[1] - interface.references[0]))
     where = "at one place" if apart < 1e-6 else f"{apart:.3g} mm apart"
     caption = (
         f"Side j (filled): points {sides[0]}; side k (open): points {sides[1]}; arrows: measured directions; spring: "
         f"the joint in {', '.join(dofs)} between the reference points, which are {where}"
         + ("; the sides are drawn apart" if shift else "")
-        + left_out
     )
-    return Sketch("sketch", _as_svg(drawn, height), caption, f"Sketch of the joint. {caption}.")
-
-
-def _nearest(flat: FloatArray, side: NDArray[np.intp]) -> float:
-    """Return the smallest distance on the page between points of both sides."""
-    between = flat[side == 0][:, None] - flat[side == 1][None]
-    return float(np.linalg.norm(between, axis=2).min(initial=np.inf))
-
-
-def _links(points: list[InterfacePoint], at: _OnPage, side: int, end: FloatArray) -> str:
-    own = [at(p.place, side) for p in points if p.side == side]
-    path = "".join(f"M{end[0]:.1f} {end[1]:.1f}L{x:.1f} {y:.1f}" for x, y in own)
-    return f'<path class="{"jk"[side]} link" stroke-width="1.2" stroke-dasharray="{("none", "5 3")[side]}" d="{path}"/>'
-
-
-def _point(point: InterfacePoint, at: _OnPage, taken: list[_Box]) -> str:
-    x, y = _pair(at(point.place, point.side))
-    side = "jk"[point.side]
-    drawn = [
-        f'<circle class="{side}{" open" if point.side else ""}" cx="{x:.1f}" cy="{y:.1f}" r="4.5" stroke-width="2"/>'
-    ]
-    taken.append(_box(x, y, 6.0))
-    for direction in point.directions:
-        step = (_VIEW @ direction) * (1, -1) * _ARROW
-        taken += _boxes_along(x, y, step)
-        drawn.append(_arrow(side, x, y, step))
-    return "".join(drawn)
-
-
-def _arrow(style: str, x: float, y: float, step: FloatArray) -> str:
-    shaft = f"M{x:.1f} {y:.1f}l{step[0]:.1f} {step[1]:.1f}"
-    return f'<path class="{style} link" stroke-width="1.6" marker-end="url(#head-{style})" d="{shaft}"/>'
-
-
-def _spring(first: FloatArray, last: FloatArray) -> str:
-    """Draw a spring between two places."""
-    step = last - first
-    length = max(float(np.hypot(*step)), 1.0)
-    place = ", ".join(f"{x:.3f}" for x in (*step, -step[1] / length, step[0] / length, *first))
-    look = 'stroke-width="1.6" stroke-linejoin="round" vector-effect="non-scaling-stroke"'
-    return f'<path class="joint open" {look} transform="matrix({place})" d="{_SPRING}"/>'
-
-
-def _corner_box(height: float) -> _Box:
-    """Return where the axes of space are drawn."""
-    return (0.0, height - _CORNER[1] - 1.6 * _AXIS, _CORNER[0] + 1.6 * _AXIS, height)
-
-
-def _axes(height: float, view: FloatArray = _VIEW) -> str:
-    """Draw the axes of space in the corner."""
-    drawn, corner = [], np.array([_CORNER[0], height - _CORNER[1]])
-    for letter, direction in zip("xyz", view.T, strict=True):
-        step = direction * (1, -1) * _AXIS
-        a, b = corner + 1.38 * step
-        drawn.append(_arrow("axis", *_pair(corner), step))
-        drawn.append(f'<text x="{a:.1f}" y="{b + 4:.1f}" text-anchor="middle" font-style="italic">{letter}</text>')
-    return "".join(drawn)
+    return scene.finished("sketch", caption, f"Sketch of the joint. {caption}.")
 
 
 class SketchedPart(NamedTuple):
@@ -363,10 +336,6 @@ def _levels(count: int, joints: Mapping[str, Mapping[int, FloatArray]]) -> list[
     return [levels[i] for i in range(count)]
 
 
-#: Nodes of a part that are drawn at most: more are a grey body.
-_MOST_NODES = 400
-
-
 def assembly_sketch(parts: Sequence[SketchedPart], sensors: Sequence[str], hits: Sequence[str]) -> Sketch | None:
     """Draw the parts of an assembly and its joints, sensors and hits; None where places of nodes are not known.
 
@@ -383,62 +352,52 @@ def assembly_sketch(parts: Sequence[SketchedPart], sensors: Sequence[str], hits:
     moved, joints = placed
     levels = _levels(len(parts), joints)
     every = np.array([at for own in moved for at in own.values()])
-    view = _view_along(int(np.argmax(np.ptp(every, axis=0))))
-    flat = every @ view.T
-    middle, scale, height = _fitted(flat)
+    scene = _Scene(every, _view_along(int(np.argmax(np.ptp(every, axis=0)))))
 
     def at(place: FloatArray, side: int) -> FloatArray:
-        right, up = (place @ view.T - middle) * scale
-        return np.array([_WIDTH / 2 + right, height / 2 - up + (2 * levels[side] - 1) * _LIFT])
+        return scene.at(place, (2 * levels[side] - 1) * _LIFT)
 
-    drawn: list[str] = []
     styles = ["jk"[level % 2] for level in levels]
     for side, own in enumerate(moved):
-        step = max(1, len(own) // _MOST_NODES)
-        spots = (at(place, side) for place in list(own.values())[::step])
-        drawn += [f'<circle class="{styles[side]} node" cx="{x:.1f}" cy="{y:.1f}" r="1.6"/>' for x, y in spots]
-    letters = [part.letter for part in parts]
-    names: dict[str, tuple[float, float]] = {}
-    taken = [_corner_box(height)]
+        for place in list(own.values())[:: max(1, len(own) // _MOST_NODES)]:
+            x, y = at(place, side)
+            scene.drawn.append(f'<circle class="{styles[side]} node" cx="{x:.1f}" cy="{y:.1f}" r="1.6"/>')
     for name, ends in joints.items():
         first, last = ([at(place, side) for side, place in ends.items()] * 2)[:2]
         if len(ends) == 1:  # the ground
             last = first + np.array([0.0, 2 * _LIFT])
-            drawn.append(f'<path class="joint open" d="M{last[0] - 7:.1f} {last[1]:.1f}h14"/>')
-        drawn.append(_spring(first, last))
-        spot = _pair((first + last) / 2)
-        taken.append(_box(*spot, 12.0))
-        names |= {name: spot} if name else {}
+            scene.drawn.append(f'<path class="joint open" d="M{last[0] - 7:.1f} {last[1]:.1f}h14"/>')
+        scene.spring(first, last)
+        scene.cover((first + last) / 2, 12.0)
+        if name:
+            scene.names[name] = (first + last) / 2
+    letters = [part.letter for part in parts]
     if len(parts) > 2:
         for side, own in enumerate(moved):
-            names.setdefault(letters[side], _pair(at(np.mean(list(own.values()), axis=0), side)))
-    for dofs, draw in ((hits, _hit), (sensors, _sensor)):
-        for dof in dofs:
-            letter, _, rest = dof.partition("/")
-            node, _, direction = rest.rpartition(":")
-            side = letters.index(letter)
-            if node in moved[side]:
-                spot_of = at(moved[side][node], side)
-                along = _on_page(direction, view)
-                drawn.append(draw(styles[side], spot_of, along))
-                names[dof] = _pair(spot_of)
-                taken.append(_box(*names[dof], 7.0))
-                taken += _boxes_along(*names[dof], -along * _ARROW) if draw is _hit else []
-    text, left_out = _names(names, taken, height)
-    drawn += [_axes(height, view), text]
+            scene.names.setdefault(letters[side], at(np.mean(list(own.values()), axis=0), side))
+    for dof, is_hit in [*((dof, True) for dof in hits), *((dof, False) for dof in sensors)]:
+        letter, _, rest = dof.partition("/")
+        node, _, direction = rest.rpartition(":")
+        side = letters.index(letter)
+        if node in moved[side]:
+            spot, step = at(moved[side][node], side), scene.step(_unit(direction))
+            step = step if step.any() else np.array([0.0, -1.0])
+            if is_hit:  # an arrow that ends at the place, from the side away from the sensors
+                scene.arrow(styles[side], spot - (4 + _ARROW) * step, step * _ARROW)
+            else:
+                x, y = spot + 5 * step - 4.5
+                scene.drawn.append(f'<rect class="{styles[side]}" x="{x:.1f}" y="{y:.1f}" width="9" height="9"/>')
+            scene.names[dof] = spot
+            scene.cover(spot, 7.0)
     named = [name for name in joints if name]
     if len(parts) == 2:
         nodes = f"{letters[0]} and of {letters[1]} (drawn below it, where they meet)"
     else:
         nodes = f"{', '.join(letters)}, where they meet (drawn apart)"
     springs = f"springs: the joints {', '.join(named)}" if named else "spring: the joint"
-    caption = f"Nodes of {nodes}; squares: sensors; arrows: hits; {springs}{left_out}"
+    caption = f"Nodes of {nodes}; squares: sensors; arrows: hits; {springs}"
     words = f"Sensors at {', '.join(sensors)}; hits at {', '.join(hits)}."
-    return Sketch("assembly", _as_svg(drawn, height), caption, f"Sketch of the assembly. {words}")
-
-
-#: How far parts are drawn apart where they meet, each way.
-_LIFT = 9.0
+    return scene.finished("assembly", caption, f"Sketch of the assembly. {words}")
 
 
 def _view_along(axis: int) -> FloatArray:
@@ -447,23 +406,10 @@ def _view_along(axis: int) -> FloatArray:
     return np.array([[right, up, away], [away, right, up], [-away, up, right]][axis]).T
 
 
-def _on_page(direction: str, view: FloatArray) -> FloatArray:
-    """Return the step on the page of a direction such as ``y``; up where it is none in space."""
+def _unit(direction: str) -> FloatArray:
+    """Return the unit vector of a direction such as ``y``; zeros where it is none in space."""
     try:
         name = direction_names([direction.lstrip("+-")])[0]
-        unit = np.eye(6)[DIRECTIONS.index(name)][:3]
     except ValueError:
-        unit = np.zeros(3)
-    step = (view @ unit) * (1, -1)
-    return np.asarray(step if unit.any() else np.array([0.0, -1.0]))
-
-
-def _sensor(style: str, spot: FloatArray, step: FloatArray) -> str:
-    x, y = spot + 5 * step
-    return f'<rect class="{style}" x="{x - 4.5:.1f}" y="{y - 4.5:.1f}" width="9" height="9"/>'
-
-
-def _hit(style: str, spot: FloatArray, step: FloatArray) -> str:
-    """Draw an arrow that ends at a place, from the side away from the sensors."""
-    x, y = spot - 4 * step
-    return _arrow(style, float(x - step[0] * _ARROW), float(y - step[1] * _ARROW), step * _ARROW)
+        return np.zeros(3)
+    return np.eye(6)[DIRECTIONS.index(name)][:3] if name in DIRECTIONS else np.zeros(3)

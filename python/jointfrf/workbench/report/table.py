@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -19,6 +20,7 @@ __all__ = [
     "Table",
     "as_text",
     "csv_cell",
+    "csv_text",
     "number",
     "plain_rows",
     "shown",
@@ -205,11 +207,14 @@ def _csv_text(cell: str) -> str:
     return f"'{text}" if text.lstrip()[:1] in _FORMULA and not _NUMBERS.fullmatch(text) else text
 
 
-def table_csv(table: Table) -> str:
-    """Write a table as CSV, numbers in full."""
-    table = shown(table)
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Write rows as CSV, numbers in full."""
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(map(csv_cell, table.columns))
-    writer.writerows([[csv_cell(cell) for cell in row] for row in plain_rows(table)])
+    csv.writer(text, lineterminator="\n").writerows(map(csv_cell, row) for row in rows)
     return text.getvalue()
+
+
+def table_csv(table: Table) -> str:
+    """Write a table as CSV."""
+    table = shown(table)
+    return csv_text([table.columns, *plain_rows(table)])

@@ -226,14 +226,14 @@ def _write_report(
 ) -> Path:
     """Write the page of a study and, beside it, its numbers, table and figures."""
     check_extras("matplotlib", "jinja2")
-    drawn = [(figure, draw(figure)) for figure in figures]
+    pictures = [Picture(figure, draw(figure)) for figure in figures]
     sections = [
-        Section("summary", "Estimates", [*(Picture(*one) for one in drawn[:1]), table]),
-        Section("figures", "Figures", [Picture(*one) for one in drawn[1:]]),
+        Section("summary", "Estimates", [*pictures[:1], table]),
+        Section("figures", "Figures", pictures[1:]),
         Section("subject", "The study", [Listing("case and design", json.dumps(record.identity, indent=1))]),
     ]
     document = Document(f"Study: {record.title}", _about(record), sections)
-    return write_results(folder, document, [table], drawn, content)
+    return write_results(folder, document, [table], content)
 
 
 def _about(record: StudyRecord) -> str:
