@@ -44,7 +44,7 @@ _FACTORS = {
     (2 * np.pi) ** 2: "frequencies in rad/s called Hz", 386.0886: "accelerations in g and lengths in inches",
     39.37008: "lengths in inches",
 }  # fmt: skip
-#: Forces of a rigid motion below this share of those of single DOFs are rounding.
+#: Share of the forces of single DOFs below which forces of a rigid motion are rounding.
 _ROUNDING = 1e-6
 #: Relative distance of a ratio from a factor up to which they agree, if the standard error of the ratio is smaller.
 _NEAR = 0.1

@@ -343,7 +343,7 @@ def _unknown_cross(result: JointEstimate, dofs: tuple[str, ...], cross: CrossTer
 
 
 def _band_parts(found: ManifoldFit) -> list[Finding]:
-    """Name parameters on which parts of the band do not agree, each fitted by itself."""
+    """Name parameters on which separate fits of parts of the band disagree."""
     parts, findings = found.parts, list[Finding]()
     if parts is None or found.cross_fits:
         return []
@@ -374,7 +374,7 @@ def _misfit(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
     misfit, noise = found.test, problem.noise
     by_part = noise.is_given and abs(misfit.ratio / np.sqrt(2) - 1) < _BY_PART
     why = "coupled" if found.cross_fits else "per-part" if by_part else ""
-    # A fit without cross terms that ignored them has a finding of its own.
+    # A fit that ignored cross terms has a separate finding.
     is_told = found.cross_fits and any(group.unknown_cross is not None for group in found.estimate.groups)
     findings = [] if noise.is_assumed or is_told else _too_large(misfit, why)
     # Intervals of the joint alone cover the change over frequency by the inertia of sides.

@@ -273,7 +273,7 @@ def _look_at(
         check = _checked(MeasuredFrfs(problem.freq_hz, problem.frfs.measured), problem.dofs, transforms)
         found = [one for one in check.findings if one.severity != "note"]
         if transforms is not None:
-            # DOFs of virtual points on flexible sides need not be passive, nor have the sign of a driving point.
+            # DOFs of virtual points on flexible sides may be active, or have another sign than a driving point.
             found = [replace(one, severity="warning") if one.severity == "error" else one for one in found]
         if raw is None and all(one.code != "amplitude-dependent" for one in found):
             return found
@@ -285,8 +285,8 @@ def _look_at(
 def _checked(
     measured: MeasuredFrfs, dofs: tuple[str, ...], transforms: tuple[FloatArray, FloatArray] | None
 ) -> FrfCheck:
-    """Look at the FRFs of the lines used, by the names of the joint DOFs where these are the channels."""
-    # A look at some lines, evenly spread, shows as much.
+    """Check the FRFs of the lines used; messages have the names of the joint DOFs if these are the channels."""
+    # Some evenly spaced lines are sufficient.
     some = spread_lines(measured.freq_hz.size)
     freq, h = measured.freq_hz[some], measured.h[some]
     if transforms is None:

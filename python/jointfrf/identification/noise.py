@@ -287,7 +287,7 @@ def _smooth_by_stated(
 def _smooth_like(
     freq: FloatArray, h: ComplexArray, variance: FloatArray, like: SmoothFrfs | None, *, reciprocal: bool
 ) -> SmoothFrfs | None:
-    """Return smooth FRFs with the poles of others, relocated; None where these leave more than of the others."""
+    """Return smooth FRFs with the poles of others, relocated; None if these leave a larger residual."""
     if like is None or not like.is_smooth or is_long(len(freq)):  # pieces have no common poles
         return None
     search = OrderSearch(patience=0)

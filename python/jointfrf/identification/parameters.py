@@ -231,7 +231,7 @@ class ParameterVector:
 
     def end(self, i: int, sign: int) -> float:
         """Return the limit of a free parameter without a bound below (-1) or above (1)."""
-        if self.is_log[i] and self.fitted[i].origin in ("joint", "mean"):  # their limits are those of the search
+        if self.is_log[i] and self.fitted[i].origin in ("joint", "mean"):  # their bounds are the limits of the search
             return np.inf if sign > 0 else 0.0
         return float(self.limits[sign > 0][i])
 

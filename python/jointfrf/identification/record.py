@@ -38,7 +38,7 @@ _LINE = 32
 #: Keys that a file of version 1 does not have.
 _OF_VERSION_2 = ("joint", "derived", "responses", "forces", "residual_is_noise", "is_converged", "findings")
 
-#: JSON has neither NaN (null) nor infinity (a text).
+#: JSON has no NaN (null) and no infinity (a text).
 Number = float | Literal["inf", "-inf"] | None
 Pair = tuple[Number, Number]
 
@@ -388,8 +388,20 @@ def load(path: Path | str) -> Fit:
 
     See Also
     --------
-    save : write a fit, with an example.
+    save : write a fit.
     read_joint : read only the joint.
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np, jointfrf as jf
+    >>> freq = np.linspace(0.5, 10, 100)
+    >>> h = jf.chain([5], [2500], [3], ground="start").receptance(freq)
+    >>> gamma = jf.couple(h, h, jf.Joint([2000.0], [3.0]).dynamic_stiffness(freq), [0], [0])
+    >>> fit = jf.identify(freq, jf.pollute(gamma, 0.02, seed=1), ["x"], damping="viscous")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     same = jf.load(jf.save(fit, f"{folder}/fit.json"))
+    >>> list(same.value)
+    ['k_x', 'c_x']
     """
     return read_record(Path(path))[0]
 

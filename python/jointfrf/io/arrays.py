@@ -1,4 +1,4 @@
-"""FRFs from arrays: axes, channels, quantity and unit are converted to those of a set, and everything is checked."""
+"""FRFs from arrays: axes, channels, quantity and unit are checked and converted to the form of a set."""
 
 from __future__ import annotations
 

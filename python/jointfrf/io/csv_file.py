@@ -427,7 +427,18 @@ def write_csv(path: str | PathLike[str], frfs: FrfSet) -> None:
 
     See Also
     --------
-    write_frfs : write in the format of the suffix, with an example.
+    write_frfs : write in the format of the suffix.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np, jointfrf as jf
+    >>> frfs = jf.io.frfs_of_arrays([10.0, 20.0], np.ones((2, 1, 1)), ["1:y"], ["1:y"], unit="m/N")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder) / "point.csv"
+    ...     jf.io.write_csv(path, frfs)
+    ...     print(path.read_text().splitlines()[-1])
+    20.0,1.0,0.0
     """
     fields: dict[str, Any] = fields_of(frfs)
     head = [f"# quantity: {fields['quantity']}"]

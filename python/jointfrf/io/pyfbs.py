@@ -148,7 +148,7 @@ def from_pyfbs(
 
 
 def _parts(test: Any, frf: Any, df_chn: Any, df_imp: Any) -> tuple[Any, Any, tuple[Any, Any]]:
-    """Return lines, FRFs and tables, or those of a `VPT`."""
+    """Return lines, FRFs and tables; a `VPT` contains its own."""
     if not hasattr(test, "apply_vpt"):
         missing = [name for name, one in (("frf", frf), ("df_chn", df_chn), ("df_imp", df_imp)) if one is None]
         if missing:

@@ -97,7 +97,14 @@ def to_sdynpy(frfs: FrfSet) -> NDArray[Any]:
 
     See Also
     --------
-    from_sdynpy : the inverse, with an example.
+    from_sdynpy : the inverse.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> frfs = jf.io.frfs_of_arrays([10.0, 20.0], np.ones((2, 1, 1)), ["1:y"], ["1:y"], unit="m/N")
+    >>> jf.io.to_sdynpy(frfs)["abscissa"].tolist()
+    [[[10.0, 20.0]]]
     """
     check_type("frfs", frfs, FrfSet)
     frfs.check_whole()
@@ -144,6 +151,13 @@ def from_escdf(dataset: Any, *, unit: str | None = None, quantity: str | None = 
     See Also
     --------
     to_escdf : the inverse.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> frfs = jf.io.frfs_of_arrays([10.0, 20.0], np.ones((2, 1, 1)), ["1:y"], ["1:y"], unit="m/N")
+    >>> jf.io.from_escdf(jf.io.to_escdf(frfs)).quantity
+    'receptance'
     """
     reading = Reading.checked(quantity, unit=unit or "")
     word = str(_property(dataset, "data_type", source)).strip().lower()
@@ -198,6 +212,13 @@ def to_escdf(frfs: FrfSet) -> dict[str, Any]:
     See Also
     --------
     from_escdf : the inverse.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> frfs = jf.io.frfs_of_arrays([10.0, 20.0], np.ones((2, 1, 1)), ["1:y"], ["1:y"], unit="m/N")
+    >>> jf.io.to_escdf(frfs)["channel"].tolist()
+    [['1Y+', '1Y+']]
     """
     check_type("frfs", frfs, FrfSet)
     frfs.check_whole()

@@ -47,7 +47,7 @@ def read_time_record(
     path: str | PathLike[str], *, skip_lines: int = 0, rate: float | None = None, unit: str = "",
     limit_gb: float | None = None,
 ) -> TimeRecord:  # fmt: skip
-    """Return a time record from a text table (CSV) or a MATLAB file.
+    r"""Return a time record from a text table (CSV) or a MATLAB file.
 
     Parameters
     ----------
@@ -80,6 +80,17 @@ def read_time_record(
     See Also
     --------
     jointfrf.decay_of_mode : frequency and damping over amplitude of a free decay.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import jointfrf as jf
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder) / "decay.csv"
+    ...     _ = path.write_text("time [s],A/1:y [mm/s^2]\n0,0\n0.001,2\n")
+    ...     record = jf.io.read_time_record(path)
+    >>> record.signals[:, 0].tolist(), record.motion
+    ([0.0, 0.002], ('acceleration',))
     """
     where = Path(path)
     check_file(where)

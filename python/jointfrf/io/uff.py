@@ -170,14 +170,6 @@ def read_uff(
     Directions of nodes with a local displacement system (datasets 15, 2411, 18, 2420) become global ones. Axes along
     global ones only rename the channels. Other axes need all three directions of a node, as responses or as forces.
 
-    Notes
-    -----
-    Units come from the labels of dataset 58. Without labels, the values are divided by the length and force factors of
-    dataset 164, according to its definition [1]_; coordinates always are. A label that is not understood is an error.
-
-    Directions of nodes with a local displacement system (datasets 15, 2411, 18, 2420) become global ones. Axes along
-    global ones only rename the channels. Other axes need all three directions of a node, as responses or as forces.
-
     References
     ----------
     .. [1] Structural Dynamics Research Laboratory, University of Cincinnati, Universal File Formats, datasets 58 and
@@ -295,7 +287,7 @@ class _Matrix:
 
 
 def _describe(file: UniversalFile, reading: Reading) -> _Content:
-    """Find the FRFs that can be used and are wanted, and what their headers state."""
+    """Return the wanted and usable FRFs, and the content of their headers."""
     content, headers = _Content(), dict[int, FunctionHeader]()
     for number in file.datasets(58):
         with file.damage_named(number):

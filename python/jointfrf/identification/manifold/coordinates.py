@@ -300,7 +300,7 @@ class DiagonalJoint(SpringJoint):
     def lowest(
         self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = LEAST_GAIN
     ) -> FormMinimum:
-        """Minimise; where a DOF ends rigid or all damping, also from no damping and from some."""
+        """Minimise; if a DOF ends rigid or with damping only, also from no damping and from some."""
         return self._minimised("lowest_diagonal_joint", forms, start, held, least_gain)
 
     def _minimised(

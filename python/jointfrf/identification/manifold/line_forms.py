@@ -267,7 +267,7 @@ class JointCoordinates(ABC):
         """Return the derivatives of the parameters by the coordinates, shape (p, p)."""
 
     def matrix(self, entries: ComplexArray) -> ComplexArray:
-        """Return R of its entries, shape (n_freq, n, n); zero where the coordinates change nothing."""
+        """Return R of its entries, shape (n_freq, n, n); zero for entries that the coordinates do not change."""
         c = np.zeros((len(entries), self.n, self.n), np.complex128)
         c[:, self.rows, self.columns] = c[:, self.columns, self.rows] = entries
         return c

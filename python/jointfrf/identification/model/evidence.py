@@ -366,7 +366,7 @@ def _as_allowed(
 
 
 def _model_groups(prediction: Prediction, size: int, *, is_sought: bool, of_shapes: bool = False) -> list[ErrorGroup]:
-    """Return the errors of the models of all parts, if any is sought or has a prior; those of mode shapes last."""
+    """Return the errors of the models of all parts, if any is sought or has a prior; mode shapes last."""
     sides = prediction.sides
     if not (is_sought or any(side.part.error_level > 0 for side in sides)):
         return []
