@@ -279,7 +279,7 @@ def calibration_errors(
         again = setups if setups is None else setups.on_lines(lines)
         differences = _differences(h, again, reciprocal=reciprocal)
     if differences is None:
-        return _as_said(span, setups)
+        return _stated_errors(span, setups)
     said = None if setups is None else setups.gain
     factors = _factors(differences, span, freq, 2 * n_slow)
     variance, degrees, exceeds = _split(factors, differences, n_slow, said)
@@ -339,7 +339,7 @@ def _split(
     return found[0], found[1], exceeds
 
 
-def _as_said(span: tuple[float, float], setups: SetUps | None) -> CalibrationErrors | None:
+def _stated_errors(span: tuple[float, float], setups: SetUps | None) -> CalibrationErrors | None:
     """Return stated errors of gain, if no FRFs show any."""
     if setups is None or (setups.gain is None and not setups.common_gain):
         return None
@@ -534,7 +534,7 @@ def _squares(factors: _Factors, weight: FloatArray, differences: _Differences) -
     for number, own in enumerate(weighted):
         if not own.any():
             continue
-        basis = _beside(own, taken)
+        basis = _orthogonal_part(own, taken)
         taken = np.concatenate([taken, basis], axis=-1)
         share = np.square(basis).sum(axis=-1)
         sums[number, 0] = np.square((of_all[..., None, :] @ basis)[..., 0, :]).sum(axis=-1)
@@ -549,7 +549,7 @@ def _squares(factors: _Factors, weight: FloatArray, differences: _Differences) -
     return sums
 
 
-def _beside(columns: FloatArray, taken: FloatArray) -> FloatArray:
+def _orthogonal_part(columns: FloatArray, taken: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the part of columns orthogonal to a given basis, padded by zero columns."""
     size = np.linalg.norm(columns, axis=(-2, -1))[..., None]
     left = columns - taken @ (taken.swapaxes(-1, -2) @ columns)

@@ -122,15 +122,15 @@ def found_cross_axis(
     of_dofs = smooth @ transform.T
     size_of_dof = np.sqrt(np.square(abs(of_dofs)).mean(axis=(0, 1)))
     channels, dofs = _shares(modes, size_of_dof, n)
-    beside = list(np.moveaxis(calibration_columns(freq, h, differences), -1, 0))
+    nuisance = list(np.moveaxis(calibration_columns(freq, h, differences), -1, 0))
     if is_translation:
-        beside.append(mass_pattern(freq, h, differences))
+        nuisance.append(mass_pattern(freq, h, differences))
     p, q = differences.rows, differences.columns
     own = [
         (q == i)[:, None] * of_dofs[:, p, d].T - (p == i)[:, None] * of_dofs[:, q, d].T
         for i, d in zip(channels, dofs, strict=True)
     ]
-    found = _estimated(h, differences, np.stack([*own, *beside], axis=-1), len(own))
+    found = _estimated(h, differences, np.stack([*own, *nuisance], axis=-1), len(own))
     if found is None:
         return None
     share, error = found

@@ -402,15 +402,15 @@ def _estimated(
 ) -> NoiseModel:
     """Return the noise model of checked FRFs; `near` is the variance of others on these lines."""
     differences = lines.differences
-    begun = None if like is None or near is None else _begun_like(lines, near, like)
+    begun = None if like is None or near is None else _initial_like(lines, near, like)
     if begun is None:
-        differences, smooth, variance, inflation = _begun(lines, differences)
+        differences, smooth, variance, inflation = _initial(lines, differences)
     else:
         smooth, variance, inflation = begun
     if not smooth.is_smooth:
         return _without_smoothing(lines, smooth, differences)
     if begun is None:
-        model = _settled(lines, smooth, variance, inflation, given, differences)
+        model = _converged(lines, smooth, variance, inflation, given, differences)
     else:
         model = _model(lines.h, smooth, given, inflation or 1.0, differences, robust=False)
     smooth = model.smooth
@@ -421,7 +421,7 @@ def _estimated(
     return replace(model, inflation=inflation, inflation_source=source)
 
 
-def _settled(
+def _converged(
     lines: _NoisyLines,
     smooth: SmoothFrfs,
     variance: FloatArray,
@@ -466,7 +466,7 @@ def _level_of_differences(lines: _NoisyLines, model: NoiseModel, differences: Re
     return level if level > 0 else None
 
 
-def _begun(
+def _initial(
     lines: _NoisyLines, differences: ReciprocityDifferences | None
 ) -> tuple[ReciprocityDifferences | None, SmoothFrfs, FloatArray, float | None]:
     """Return first smooth FRFs, their variance and inflation, and the differences if these show the noise."""
@@ -479,7 +479,7 @@ def _begun(
     return differences, smooth, variance, inflation
 
 
-def _begun_like(
+def _initial_like(
     lines: _NoisyLines, near: FloatArray, like: NoiseModel
 ) -> tuple[SmoothFrfs, FloatArray, float | None] | None:
     """Return smooth FRFs with relocated poles of others; None if these leave more noise."""

@@ -85,7 +85,7 @@ def derived_quantity(
         except ValueError:  # a root or a logarithm of a negative number
             return math.nan
 
-    value, slope = at(values), _slope(at, values, np.sqrt(np.maximum(np.diagonal(covariance), 0)))
+    value, slope = at(values), _gradient(at, values, np.sqrt(np.maximum(np.diagonal(covariance), 0)))
     used = np.flatnonzero(slope)
     own = slope[used] @ covariance[used[:, None], used] @ slope[used]
     std_error = float(np.sqrt(own)) if own > 0 else (math.nan if math.isnan(own) else 0.0)
@@ -105,7 +105,7 @@ def derived_quantity(
     return Derived(value, std_error, value - reach, value + reach)
 
 
-def _slope(at: Callable[[FloatArray], float], best: FloatArray, errors: FloatArray) -> FloatArray:
+def _gradient(at: Callable[[FloatArray], float], best: FloatArray, errors: FloatArray) -> FloatArray:
     """Return the derivatives of a function at the estimate; 0 for parameters that do not enter."""
     slope = np.zeros(best.size)
     for i, error in enumerate(errors):

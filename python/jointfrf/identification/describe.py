@@ -121,7 +121,7 @@ def describe_springs(found: ManifoldFit, problem: FitProblem) -> Fit:
         *_outlying_lines(problem),
         *_small_residual(found, problem),
         *_sides(problem),
-        *_seen(fit, intervals),
+        *_between_points(fit, intervals),
         *_groups([group.dofs for group in result.groups], fit.dofs, problem.options.cross),
         *_equal_points(same),
         *_hidden_lines(result, fit.dofs),
@@ -266,7 +266,7 @@ def _sides(problem: FitProblem) -> list[Finding]:
     return [Finding("sides-flexible", {"values": values}, tuple(dof for dof, _ in known))]
 
 
-def _seen(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[Finding]:
+def _between_points(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[Finding]:
     """Explain numbers between virtual points on sides that may be flexible, and how to narrow the intervals."""
     if not fit.seen:
         return []

@@ -103,7 +103,7 @@ def elastic_centre(joint: Joint | Fit) -> ElasticCentre:
     if not (diagonal > 0).all():
         bad = int(np.argmin(diagonal))
         raise ValueError(f"joint: the stiffness of {joint.dofs[bad]} must be positive, not {diagonal[bad]:g}")
-    return _found(_Coupling(joint, covariance))
+    return _minimised(_Coupling(joint, covariance))
 
 
 def _stiffness_covariance(fit: Fit) -> FloatArray:
@@ -185,14 +185,14 @@ class _Coupling:
         return found
 
 
-def _found(coupling: _Coupling) -> ElasticCentre:
+def _minimised(coupling: _Coupling) -> ElasticCentre:
     """Minimise the coupling from the present point, and from the zero of its linear part."""
     from scipy import optimize
 
     start = optimize.least_squares(coupling.weighted, np.zeros(3), xtol=1e-14, ftol=1e-14, gtol=1e-14)
     linear = optimize.least_squares(coupling.weighted, coupling.linear(), xtol=1e-14, ftol=1e-14, gtol=1e-14)
     best = min((start, linear), key=lambda one: one.cost)
-    jacobian = _slope(coupling, best.x)
+    jacobian = _jacobian(coupling, best.x)
     _, size, right = np.linalg.svd(jacobian, full_matrices=True)
     size = np.pad(size, (0, 3 - size.size))
     is_seen = size > _UNSEEN * max(size[0], np.finfo(float).tiny)
@@ -205,7 +205,7 @@ def _found(coupling: _Coupling) -> ElasticCentre:
     return ElasticCentre(offset, error, covariance, before, after, coupling.joint.moved(offset))
 
 
-def _slope(coupling: _Coupling, at: FloatArray) -> FloatArray:
+def _jacobian(coupling: _Coupling, at: FloatArray) -> FloatArray:
     """Return the derivatives of the weighted coupling by the scaled offset, shape (pairs, 3)."""
     steps = 1e-6 * np.eye(3)
     slope: FloatArray = np.stack(

@@ -60,7 +60,7 @@ def without_window(fit: Fit, decay: float) -> Fit:
     return replace(
         fit, estimate=estimate, covariance=covariance, k_lines=k_lines,
         intervals=_intervals(own, fit.covariance, covariance, back, moved),
-        seen={name: _moved(one, _seen_shift(fit, name, one, moved)) for name, one in fit.seen.items()},
+        seen={name: _moved(one, _shift_between_points(fit, name, one, moved)) for name, one in fit.seen.items()},
         findings=(*fit.findings, removed),
     )  # fmt: skip
 
@@ -88,7 +88,7 @@ def _intervals(own: Intervals, before: FloatArray, after: FloatArray, back: Floa
     return Intervals(own.names, limits, of_function)
 
 
-def _seen_shift(fit: Fit, name: str, one: SeenStiffness, moved: FloatArray) -> float:
+def _shift_between_points(fit: Fit, name: str, one: SeenStiffness, moved: FloatArray) -> float:
     """Return the shift by the window of a stiffness between virtual points."""
     place = [each.name for each in fit.parameters].index(name)
     share = one.value / float(fit.estimate[place])

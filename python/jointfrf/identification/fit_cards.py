@@ -85,7 +85,7 @@ def cards(
     if fit.points or isinstance(nodes, Mapping):
         return "".join(_cards_of_points(fit, program, nodes, about, options, all_damping, bounds, freq_hz))
     intervals = fit.confidence_interval(0.95)
-    dropped = _worthless(fit, intervals) if fit.laws is None and not all_damping else set()
+    dropped = _insignificant(fit, intervals) if fit.laws is None and not all_damping else set()
     _check_finite(fit)
     if not bounds:
         _check_known(fit, intervals)
@@ -93,7 +93,11 @@ def cards(
         *about,
         f"method {fit.method}, {fit.freq_hz.min():g} to {fit.freq_hz.max():g} Hz, {fit.freq_hz.size} lines; value, "
         "95 % interval, unit:",
-        *(_worth(fit, one, intervals[one.name], one in dropped) for one in fit.parameters if one.origin == "joint"),
+        *(
+            _uncertainty(fit, one, intervals[one.name], one in dropped)
+            for one in fit.parameters
+            if one.origin == "joint"
+        ),
         *(f"warning: {warning}" for warning in fit.warnings),
     ]
     if fit.laws is not None:
@@ -149,7 +153,7 @@ def _cards_of_points(
         yield "\n".join(("MPCADD  " if i == 0 else " " * 8) + "".join(row) for i, row in enumerate(rows)) + "\n"
 
 
-def _worthless(fit: Fit, intervals: dict[str, tuple[float, float]]) -> set[FittedParameter]:
+def _insignificant(fit: Fit, intervals: dict[str, tuple[float, float]]) -> set[FittedParameter]:
     """Return the damping of DOFs that is not significantly above zero, with the cross terms of these DOFs."""
     bad = {
         term
@@ -183,7 +187,7 @@ def _check_known(fit: Fit, intervals: dict[str, tuple[float, float]]) -> None:
         )
 
 
-def _worth(fit: Fit, term: FittedParameter, interval: tuple[float, float], is_dropped: bool) -> str:
+def _uncertainty(fit: Fit, term: FittedParameter, interval: tuple[float, float], is_dropped: bool) -> str:
     """Return one line on the uncertainty of a parameter."""
     low, high = interval
     text = f"{term.name} = {fit.value[term.name]:.5g}, {low:.4g} .. {high:.4g} {term.unit}"

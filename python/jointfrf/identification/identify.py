@@ -208,7 +208,7 @@ def identify(
     accepted = as_accepted(accept)
     # Models of the sides have corrected the FRFs of the problem.
     raw = None if sides is None else measured.h[np.isin(measured.freq_hz, problem.freq_hz)]
-    of_data = _look_at(problem, transform, raw)
+    of_data = _data_checks(problem, transform, raw)
     stop_at_errors(of_data, accepted)
     if any(one.code == "amplitude-dependent" for one in of_data):
         if problem.noise.cross_axis is not None:
@@ -259,7 +259,7 @@ def _check_sides(sides: tuple[SideModel, SideModel] | None) -> tuple[SideModel, 
     return sides[0], sides[1]
 
 
-def _look_at(
+def _data_checks(
     problem: FitProblem, transform: Transform | tuple[Transform, Transform] | None, raw: ComplexArray | None
 ) -> list[Finding]:
     """Return errors and warnings of the FRFs; amplitude dependence of `raw` ones if models corrected them."""

@@ -164,7 +164,7 @@ def identify_model(
     mass = None if sensor_mass is None else as_not_negative("sensor_mass", sensor_mass)
     known = NoiseOptions(noise, coherence, averages, setups=setups, sensor_mass=mass)
     problem = prepare_model_fit(freq_hz, h, assembly, channels, known, fixed, _springs_at_joint)
-    of_data = _look_at(problem, channels)
+    of_data = _data_checks(problem, channels)
     stop_at_errors(of_data, [*as_accepted(accept), *(_SOUGHT if find_wrong_channels else ())])
     if any(one.code == "amplitude-dependent" for one in of_data):
         problem = replace(problem, motion=motion_of_lines(problem.measured))
@@ -181,7 +181,7 @@ def identify_model(
     return fit
 
 
-def _look_at(problem: ModelProblem, channels: Channels) -> list[Finding]:
+def _data_checks(problem: ModelProblem, channels: Channels) -> list[Finding]:
     """Return errors and warnings of the FRFs, except gains that are unknowns of the fit."""
     wrong = wrong_numbers_of(problem.freq_hz, problem.measured)
     if wrong is not None:

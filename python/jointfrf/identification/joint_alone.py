@@ -55,7 +55,7 @@ def with_joint_alone(fit: Fit, alone: JointAlone) -> Fit:
         estimate=estimate,
         covariance=fit.correlation * np.outer(errors, errors),
         intervals=intervals,
-        seen=_seen(fit, alone),
+        seen=_between_points(fit, alone),
     )
 
 
@@ -75,7 +75,7 @@ def _error(is_stiffness: bool, value: float, low: float, high: float, otherwise:
     return (high - low) / (2 * _REACH) if np.isfinite(low) and np.isfinite(high) else otherwise
 
 
-def _seen(fit: Fit, alone: JointAlone) -> dict[str, SeenStiffness]:
+def _between_points(fit: Fit, alone: JointAlone) -> dict[str, SeenStiffness]:
     """Return the stiffness of each DOF between virtual points, and the causes of a wide interval of the joint alone."""
     parts = np.array([np.hypot(alone.softer, alone.stiffer), alone.inertia, alone.noise]) ** 2
     shares = parts / np.maximum(parts.sum(axis=0), np.finfo(float).tiny)

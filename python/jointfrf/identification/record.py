@@ -440,12 +440,12 @@ def _fit_of(content: object, source: str) -> Fit:
     try:
         record = msgspec.convert({**older, **content}, _Record)
     except msgspec.ValidationError as error:
-        raise FileContentError(f"{source}: {_said(str(error))}") from None
+        raise FileContentError(f"{source}: {_faulty_key(str(error))}") from None
     with _named_key(source) as at:
         return _fit_of_record(record, at)
 
 
-def _said(error: str) -> str:
+def _faulty_key(error: str) -> str:
     """Return which key is missing or damaged."""
     if missing := re.fullmatch(r"Object missing required field `(\w+)`", error):
         return f'"{missing[1]}" is missing'

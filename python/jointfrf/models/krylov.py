@@ -13,7 +13,7 @@ from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.kernel.call import RCOND_LIMIT
 from jointfrf.models.factors import Factors, SingularMatrixError, SparseSolver
 from jointfrf.models.matrices import ModelMatrices, Ports, directions
-from jointfrf.models.modal import Modes, RigidModes, find_rigid_modes, held
+from jointfrf.models.modal import Modes, RigidModes, find_rigid_modes, no_rigid_modes
 
 __all__ = ["reduce_model", "spot_error"]
 
@@ -156,7 +156,7 @@ def spot_error(
         worst conditioned line that gives no warning.
     """
     found = modes.lines(freq_hz, "nan")[0]
-    parts = held(matrices.n) if rigid is None else rigid
+    parts = no_rigid_modes(matrices.n) if rigid is None else rigid
     own = parts.dynamic_stiffness(matrices, 2 * np.pi * freq_hz)
     forces = inputs.forces()
     straining = parts.straining_forces(forces).astype(np.complex128)

@@ -15,7 +15,16 @@ from jointfrf.kernel.call import N_FREQ, RCOND_LIMIT, LineStatus, OnSingular, ch
 from jointfrf.models.factors import SingularMatrixError, SparseSolver, factor
 from jointfrf.models.matrices import ModelMatrices, Operand, Ports
 
-__all__ = ["SINGULAR", "ModalFrfs", "Modes", "RigidModes", "all_modes", "find_rigid_modes", "held", "mode_condition"]
+__all__ = [
+    "SINGULAR",
+    "ModalFrfs",
+    "Modes",
+    "RigidModes",
+    "all_modes",
+    "find_rigid_modes",
+    "mode_condition",
+    "no_rigid_modes",
+]
 
 #: Reciprocal condition below which a line is singular: a fine mesh in mixed units has 1e-13 and still nine digits.
 SINGULAR = _EPS = float(np.finfo(np.float64).eps)
@@ -72,7 +81,7 @@ class RigidModes:
         return np.asarray(motion - self.shapes @ (self.momenta.T @ motion))
 
 
-def held(n: int) -> RigidModes:
+def no_rigid_modes(n: int) -> RigidModes:
     """Return no rigid-body modes, for a structure of n DOFs that is not free."""
     return RigidModes(np.zeros((n, 0)), np.zeros((n, 0)), np.zeros(0), np.zeros(0))
 
@@ -134,7 +143,7 @@ def find_rigid_modes(k: Operand, m: Operand, solver: SparseSolver | None = None)
     while True:
         found = _lowest_modes(k, magnitudes, m, size, solver)
         if found is None:
-            return held(n)
+            return no_rigid_modes(n)
         squared, shapes, terms = found
         known = np.maximum(squared, _EPS * terms)
         soft = np.logical_and.accumulate(known <= _SOFT * terms)
@@ -146,7 +155,7 @@ def find_rigid_modes(k: Operand, m: Operand, solver: SparseSolver | None = None)
     apart = np.flatnonzero(soft & (above >= _GAP * known))
     count = apart[-1] + 1 if apart.size else 0
     if not count:
-        return held(n)
+        return no_rigid_modes(n)
     # separate again from higher modes, whose w^2 is large enough to spoil the last digits of these
     squared, shapes, terms = _ritz(k, magnitudes, m, shapes[:, :count])
     rounding = _EPS * terms

@@ -271,15 +271,15 @@ def _lines(name: str, given: int | Sequence[float], length: float) -> FloatArray
 
 def _free(nx: int, ny: int, edges: Sequence[Edge]) -> NDArray[np.intp]:
     """Return the DOFs that no edge fixes, counted from 0."""
-    held = np.zeros((ny, nx, 3), bool)
-    views = (held[:, 0], held[:, -1], held[0], held[-1])
+    fixed = np.zeros((ny, nx, 3), bool)
+    views = (fixed[:, 0], fixed[:, -1], fixed[0], fixed[-1])
     for edge, own, along in zip(edges, views, (1, 1, 2, 2), strict=True):
         own[:, 0] |= edge != "free"
         own[:, along] |= edge != "free"
         own[:, 3 - along] |= edge == "clamped"
-    if held.all():
+    if fixed.all():
         raise ValueError("the edges fix every node; give more elements, or free edges")
-    return np.flatnonzero(~held.ravel())
+    return np.flatnonzero(~fixed.ravel())
 
 
 def _named(what: str, given: Mapping[str, Any] | None, taken: Collection[str]) -> dict[str, Any]:

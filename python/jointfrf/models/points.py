@@ -285,12 +285,12 @@ def _followers(model: PointModel, number: Mapping[str, int], patch: PointPatch) 
     turning = patch.coupling == "rigid" or len(patch.nodes) < 3
     for i, node in enumerate(patch.nodes):
         names = [f"{node}:{direction}" for direction in DIRECTIONS]
-        held = [name for name in names[:3] if name not in number]
-        if held:
+        absent = [name for name in names[:3] if name not in number]
+        if absent:
             why = "it is fixed or belongs to another constraint of the file"
             if any(f"{node}:local_{direction}" in number for direction in DIRECTIONS[:3]):
                 why = "its directions are local; write the model in global ones"
-            raise ValueError(f"point {patch.name}: node {node} has no DOF {held[0]}: {why}")
+            raise ValueError(f"point {patch.name}: node {node} has no DOF {absent[0]}: {why}")
         dofs += [number[name] for name in names[:3]]
         rows += list(motion[i])
         for axis in range(3):

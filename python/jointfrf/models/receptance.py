@@ -315,7 +315,7 @@ def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, Recept
     else:
         result, status = _solve_stored(task, to.needed, into.needed, how)
     if status.lowest_rcond < RCOND_LIMIT:
-        status = _judged(task.matrices, freq, status)
+        status = _checked_status(task.matrices, freq, status)
         result[status.line_info > 0] = np.nan
         check_lines("receptance", status, {}, freq, task.on_singular, RCOND_LIMIT)
     if how != "sparse" and weighted:
@@ -392,7 +392,7 @@ def _reciprocal_condition(z: sparse.csc_matrix, factors: Factors) -> float:
     return 1 / size if size > 0 else 0.0
 
 
-def _judged(matrices: ModelMatrices, freq: FloatArray, status: LineStatus) -> LineStatus:
+def _checked_status(matrices: ModelMatrices, freq: FloatArray, status: LineStatus) -> LineStatus:
     """Return the status of lines: singular if the structure is free, or with an unreliable condition.
 
     Rounding decides whether elimination of a singular matrix meets a zero; rigid motions without stiffness show it. A

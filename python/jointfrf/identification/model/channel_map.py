@@ -144,10 +144,10 @@ def find_channel_change(problem: ModelProblem, channels: Channels) -> ChannelSea
         )
         # Initial values from which the channels as named do not reach their minimum are no evidence against them.
         given = min(given, minimise(problem.likelihood, nearest.x), key=lambda one: one.cost)
-    return _judged(problem, changes, given.cost, np.array([one.cost for one in found]))
+    return _significant_change(problem, changes, given.cost, np.array([one.cost for one in found]))
 
 
-def _judged(
+def _significant_change(
     problem: ModelProblem, changes: Sequence[ChannelChange], given: float, squares: FloatArray
 ) -> ChannelSearch:
     """Return the change that the least squares with each change show, and a sentence."""

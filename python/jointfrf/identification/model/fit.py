@@ -253,7 +253,7 @@ def fit_assembly(problem: ModelProblem) -> FoundModel:
             problem = changed
             minimum = minimise(problem.likelihood, minimum.x)
         likelihood, minimum = with_spreads(problem.likelihood, minimum)
-        return _judged(replace(problem, vector=likelihood.vector), minimum, other)
+        return _result_at(replace(problem, vector=likelihood.vector), minimum, other)
 
 
 def _explained(problem: ModelProblem, minimum: Minimum) -> float:
@@ -404,7 +404,7 @@ def _about(problem: ModelProblem, noise: NoiseModel, predicted: ComplexArray) ->
     return variance
 
 
-def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel:
+def _result_at(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel:
     """Return covariance, intervals and tests at a minimum, with nominal values for undetermined parameters."""
     likelihood = problem.likelihood
     residual, predicted = _residual(problem, likelihood, minimum)
@@ -433,7 +433,7 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
         blind &= bool(likelihood.cost(believed) < minimum.cost + _SAME)
         minimum = minimum._replace(x=np.where(blind, believed, minimum.x))
     values = vector.to_values(minimum.x)
-    matters = found is not None and _matters(vector, without, minimum)
+    matters = found is not None and _changes_joint(vector, without, minimum)
     at = ModelLinearised.of(likelihood, minimum, problem.noise.inflation)
     every_line = np.ones((1, problem.freq_hz.size))
     shape = problem.measured.shape[1], problem.measured.shape[2]
@@ -489,7 +489,7 @@ def _gains(vector: ParameterVector, minimum: Minimum) -> tuple[GainError, ...]:
     )
 
 
-def _matters(vector: ParameterVector, without: Minimum, minimum: Minimum) -> bool:
+def _changes_joint(vector: ParameterVector, without: Minimum, minimum: Minimum) -> bool:
     """Return whether model errors change the joint, or widen its intervals, by a tenth of a standard error."""
     n = vector.n_shown
     joint = np.array([one.origin in ("joint", "mean") for one in vector.fitted[:n]], bool)
@@ -638,7 +638,7 @@ def open_directions(vector: ParameterVector, x: FloatArray, information: FloatAr
     scaled = of_frfs * np.outer(unit, unit)
     value, turned = np.linalg.eigh(scaled)
     found = []
-    for direction in _apart(turned[:, value < 1]).T:
+    for direction in _disjoint(turned[:, value < 1]).T:
         size, largest = float(direction @ scaled @ direction), abs(direction).max()
         change = direction * unit * slope / np.where(values == 0, 1, abs(values))
         change = change * np.sign(direction[abs(direction).argmax()])
@@ -654,7 +654,7 @@ def open_directions(vector: ParameterVector, x: FloatArray, information: FloatAr
     return tuple(found)
 
 
-def _apart(directions: FloatArray) -> FloatArray:
+def _disjoint(directions: FloatArray) -> FloatArray:
     """Return directions of the same space that share no parameters, as far as possible; in columns."""
     if directions.shape[1] < 2:
         return directions

@@ -90,7 +90,7 @@ def refined(likelihood: Likelihood, trials: Sequence[FloatArray]) -> Iterator[Fl
     of_joint = LogLikelihood(likelihood.prediction, own, likelihood.measured, weight)
     found = list(trials[:1])
     if own.free.size:
-        apart = _apart(vector, trials)
+        apart = _distinct(vector, trials)
         minima = [minimise(of_joint, own.to_coordinates(values), steps=15, least=1e-2) for values in apart]
         found = [own.to_values(one.x) for one in sorted(minima, key=lambda one: one.cost)]
     for values in found:
@@ -98,7 +98,7 @@ def refined(likelihood: Likelihood, trials: Sequence[FloatArray]) -> Iterator[Fl
         yield x if own.free.size == vector.free.size else minimise(broad, x, steps=15, least=1e-2).x
 
 
-def _apart(vector: ParameterVector, trials: Sequence[FloatArray]) -> list[FloatArray]:
+def _distinct(vector: ParameterVector, trials: Sequence[FloatArray]) -> list[FloatArray]:
     """Return the best trials that are not near to a better one."""
     kept: list[FloatArray] = []
     logs: list[FloatArray] = []
