@@ -7,13 +7,13 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
-#: Packages that are reached as attributes, as in ``jointfrf.io.read_uff``, and their modules.
+#: Packages that are attributes, as in ``jointfrf.io.read_uff``, and their modules.
 _PACKAGES = {"io": "jointfrf.io", "report": "jointfrf.workbench.report", "solids": "jointfrf.workbench.solids"}
 
 
 @cache
 def _places() -> dict[str, str]:
-    """Public names and their modules: the imports of ``__init__.pyi``, which type checkers read, too."""
+    """Return public names and their modules, from the imports of ``__init__.pyi``, which type checkers also read."""
     import ast
 
     stub = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
@@ -22,7 +22,7 @@ def _places() -> dict[str, str]:
 
 
 def __getattr__(name: str) -> object:
-    """Import a public name when it is asked for: what needs scipy takes its time to import."""
+    """Import a public name on first use, because importing scipy is slow."""
     if name in _PACKAGES:
         return import_module(_PACKAGES[name])
     if name == "__version__":

@@ -1,10 +1,10 @@
-"""The command `jointfrf`, and `python -m jointfrf`: what it is made of is imported where Ctrl-C is already known."""
+"""The command `jointfrf`, and `python -m jointfrf`; its modules are imported after Ctrl-C is handled."""
 
 import os
 import sys
 from pathlib import Path
 
-# `python -m` has put the working directory first among the places of modules; the script of the command has not.
+# `python -m` puts the working directory first in the search path of modules; the script of the command does not.
 _HERE = os.getcwd()
 if (
     __name__ != "jointfrf.__main__"
@@ -16,7 +16,7 @@ if (
 
 
 def main() -> int:
-    """Run the command line; returns the exit status, 130 after Ctrl-C."""
+    """Run the command line; return the exit status, 130 after Ctrl-C."""
     try:
         from jointfrf.workbench.cli.main import main as run
     except KeyboardInterrupt:

@@ -1,4 +1,4 @@
-"""Words that functions and commands take; nothing that computes is imported to know them."""
+"""Words that functions and commands accept; this module imports nothing that computes."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ __all__ = [
 
 #: Terms of K* in addition to its stiffness.
 DampingTerms = Literal["none", "viscous", "hysteretic", "both"]
-#: Terms that couple the DOFs of a joint: none, and this is used; perhaps, but not sought; fitted between the DOFs of
-#: each point, none between points; fitted.
+#: Terms that couple the DOFs of a joint: none; perhaps, but not fitted; fitted between the DOFs of each point, none
+#: between points; fitted.
 CrossTerms = Literal["zero", "ignore", "points", "fit"]
 StiffnessMethod = Literal[
     "ismm", "ismm-kj", "inverse-substructuring", "decoupling-rr", "decoupling-rs", "decoupling-sr", "decoupling-ss"
@@ -34,13 +34,13 @@ MotionQuantity = Literal["displacement", "velocity", "acceleration"]
 #: Designs of a study.
 Arrangement = Literal["full", "one-at-a-time"]
 
-#: How often a receptance is differentiated in time to give the quantity.
+#: Number of differentiations of a receptance in time that give the quantity.
 POWER_OF_I_OMEGA = {"receptance": 0, "mobility": 1, "accelerance": 2}
 #: Laws over amplitude.
 AMPLITUDE_LAWS = ("constant", "power", "jenkins", "iwan", "bouc-wen")
-#: The kinds of cases, each a package of `jointfrf.workbench.cases`; the first is that of a case that names none.
+#: Kinds of cases, each a package of `jointfrf.workbench.cases`; the first is the default.
 CASE_KINDS = ("known-joint", "bolted-lap", "modelled-joint")
-#: The fields of `jointfrf.io.FrfMapping`.
+#: Fields of `jointfrf.io.FrfMapping`.
 MAPPING_FIELDS = (
     "freq_hz",
     "h",

@@ -9,10 +9,10 @@ from jointfrf.spelling import did_you_mean
 
 __all__ = ["DIRECTIONS", "PLACES", "direction_names"]
 
-#: The six directions of a point: displacements, then rotations, right-handed.
+#: Directions of a point: displacements, then rotations, right-handed.
 DIRECTIONS = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
 
-#: How names of directions begin, before the axis, in small letters; u, f and m as in files and in the thesis.
+#: Beginnings of names of directions, before the axis, in small letters; u, f and m as in files and in the thesis.
 _AXES = "xyz"
 _TRANSLATIONS = ("", "u", "u_", "f")
 _ROTATIONS = ("theta_", "theta", "r", "rot_", "rot", "m", "mtheta_", "mtheta")

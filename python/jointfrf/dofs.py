@@ -1,4 +1,4 @@
-"""Degrees of freedom by name: which are rotations, their units, the parameters of a joint, rigid motion."""
+"""Degrees of freedom by name: rotations, units, the parameters of a joint, rigid motion."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ __all__ = [
     "similar_dof",
 ]
 
-#: A rotation whose axis the name may leave out, as in a plane: theta, Mtheta, rot1.
+#: A rotation whose name may omit the axis, as in a plane: theta, Mtheta, rot1.
 _ROTATION = re.compile(r"m?(theta|phi|rot|r[xyz])", re.IGNORECASE)
-#: What follows the point in the name of a parameter.
+#: Part of the name of a parameter after the point.
 _OF_POINT = re.compile("[khc]_")
 
 #: Units of numbers of a joint between two DOFs of which 0, 1 or 2 are rotations.
@@ -52,7 +52,7 @@ ParameterKind = Literal["k", "h", "c"]
 
 
 def point_and_direction(dof: str) -> tuple[str, str]:
-    """Return the point and the direction of a DOF like ``"bolt1.y"``: of one of several joint points.
+    """Return the point and the direction of a DOF such as ``"bolt1.y"``, one of several joint points.
 
     Examples
     --------
@@ -65,7 +65,7 @@ def point_and_direction(dof: str) -> tuple[str, str]:
 
 
 def parameter_name(kind: str, row: str, column: str) -> str:
-    """Name a number of a joint between two DOFs: first the point where both have the same.
+    """Return the name of a number of a joint between two DOFs: first the point, if both have the same.
 
     Examples
     --------
@@ -81,17 +81,19 @@ def parameter_name(kind: str, row: str, column: str) -> str:
 
 
 def parameters_shared(names: Sequence[str], same: Sequence[Sequence[str]]) -> NDArray[np.intp]:
-    """Return, for each parameter, the number of that whose value it has, counted among those that are left.
+    """Return for each parameter the number of the remaining parameter with its value.
 
     Parameters
     ----------
     names : sequence of str, length q
+        Names of the parameters.
     same : sequence of sequence of str
-        Points whose joints are equal: a parameter ``"bolt2.k_y"`` is that of the first point of its list.
+        Points with equal joints: a parameter ``"bolt2.k_y"`` equals the parameter of the first point of its list.
 
     Returns
     -------
     ndarray of int, shape (q,)
+        Number of the remaining parameter.
 
     Raises
     ------
@@ -123,7 +125,7 @@ def parameters_shared(names: Sequence[str], same: Sequence[Sequence[str]]) -> ND
 
 
 def is_rotation(dof: str) -> bool:
-    """Whether a DOF is a rotation: by its name, as `direction_places` reads it, or a name like theta, Mtheta, phi, rot.
+    """Return whether a DOF is a rotation: by a name for `direction_places`, or one like theta, Mtheta, phi, rot.
 
     Examples
     --------
@@ -138,12 +140,12 @@ def is_rotation(dof: str) -> bool:
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a joint: a kind of stiffness or damping between two DOFs, or of one DOF where both are the same.
+    """One number of a joint: a kind of stiffness or damping between two DOFs, or of one DOF if both are the same.
 
     Attributes
     ----------
     kind : {"k", "h", "c"}
-        Stiffness, hysteretic stiffness eta k, viscous damping.
+        Kind: stiffness, hysteretic stiffness eta k, viscous damping.
     row, column : str
         Names of the DOFs.
 
@@ -167,7 +169,7 @@ class Parameter:
 
     @classmethod
     def parse(cls, name: str) -> Parameter:
-        """Read a name like ``"k_y"``, ``"c_y,theta"`` or ``"bolt1.k_y"``.
+        """Return the parameter of a name such as ``"k_y"``, ``"c_y,theta"`` or ``"bolt1.k_y"``.
 
         Raises
         ------
@@ -190,7 +192,7 @@ class Parameter:
 
     @property
     def name(self) -> str:
-        """``"k_<dof>"``, or ``"k_<dof>,<dof>"`` of a cross term; before it the point of both, ``"bolt1.k_y"``."""
+        """Name ``"k_<dof>"``, or ``"k_<dof>,<dof>"`` for a cross term, after the common point, ``"bolt1.k_y"``."""
         return parameter_name(self.kind, self.row, self.column)
 
     @property
@@ -208,7 +210,7 @@ class Parameter:
 def joint_parameters(
     dofs: Sequence[str], kinds: Sequence[ParameterKind] = ("k", "c"), *, cross: bool = False
 ) -> tuple[Parameter, ...]:
-    """Return the parameters of a joint: of each kind those of all DOFs, then, with `cross`, those of all pairs.
+    """Return the parameters of a joint: for each kind first all DOFs, then, with `cross`, all pairs.
 
     Examples
     --------
@@ -225,7 +227,7 @@ def joint_parameters(
 def similar_dof(name: str, known: Iterable[str]) -> str:
     """Return the end of a sentence that proposes a known DOF; empty if none is similar.
 
-    Parts name rotations differently: a rotation at the same node comes before a name that only looks alike.
+    Parts name rotations differently: a rotation at the same node precedes a name that only looks similar.
 
     Examples
     --------
@@ -251,24 +253,24 @@ def compliance_unit(response: str, force: str) -> str:
 
 
 def direction_places(dofs: Sequence[str]) -> NDArray[np.intp]:
-    """Return the place of each DOF among `DIRECTIONS`, counted from 0, shape (n,); errors as of `direction_names`."""
+    """Return the place of each DOF among `DIRECTIONS`, counted from 0, shape (n,); errors as in `direction_names`."""
     return np.array([DIRECTIONS.index(name) for name in direction_names(as_names("dofs", dofs))], np.intp)
 
 
 def rigid_motion(points: FloatArray, about: FloatArray) -> FloatArray:
-    """Displacements of points that follow a reference point, u = u_R + theta x r.
+    """Return displacements of points that follow a reference point, u = u_R + theta x r.
 
     Parameters
     ----------
     points : ndarray, shape (n, 3)
-        m.
+        Positions of the points, m.
     about : ndarray, shape (3,)
         Reference point, m.
 
     Returns
     -------
     ndarray, shape (n, 3, 6)
-        For unit motions x, y, z, theta_x, theta_y, theta_z.
+        Displacements for unit motions x, y, z, theta_x, theta_y, theta_z.
     """
     r = points - about
     motion = np.zeros((len(points), 3, 6))
@@ -279,25 +281,30 @@ def rigid_motion(points: FloatArray, about: FloatArray) -> FloatArray:
 
 
 def rigid_offset(dofs: Sequence[str], offset: ArrayLike) -> FloatArray:
-    """Motion of a point rigidly connected to another one: u_new = u + theta x offset, theta_new = theta.
+    """Return the motion of a point rigidly connected to another one: u_new = u + theta x offset, theta_new = theta.
 
     Parameters
     ----------
     dofs : sequence of str
-        Names of the n DOFs, in any order: x, y, z (or ux, ...), theta_x, theta_y, theta_z (or rx, rot_x, ...). Those
-        that are missing are taken as zero.
+        Names of the n DOFs, in any order: x, y, z (or ux, ...), theta_x, theta_y, theta_z (or rx, rot_x, ...). Missing
+        ones are zero.
     offset : array_like, shape (3,)
-        From the old point to the new one along x, y, z, m.
+        Vector from the old point to the new one along x, y, z, m.
 
     Returns
     -------
     ndarray, shape (n, n)
-        T of q_new = T q and, for forces, f = T^T f_new. The way back is the opposite offset: T(-offset) = T^-1.
+        Matrix T of q_new = T q and, for forces, f = T^T f_new. The inverse has the opposite offset: T(-offset) = T^-1.
 
     Raises
     ------
     ValueError
         A name that is not known or comes twice, a wrong shape, NaN or Inf.
+
+    See Also
+    --------
+    Joint.moved : a joint at another reference point.
+    virtual_point : transform from channels to a point.
 
     Notes
     -----

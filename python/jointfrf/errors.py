@@ -1,4 +1,4 @@
-"""Exceptions and warnings, one meaning each."""
+"""Exceptions and warnings, each with one meaning."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = [
 ]
 
 
-#: Most characters of the message of another library that are repeated.
+#: Largest number of characters of a message of another library that is repeated.
 _LONGEST = 200
 
 
@@ -31,9 +31,9 @@ class SingularLineError(np.linalg.LinAlgError):
     Attributes
     ----------
     lines : ndarray of int
-        The bad lines, counted from 0.
+        Numbers of the singular lines, counted from 0.
     freq_hz : ndarray of float or None
-        Their frequencies in Hz, where the caller gave them.
+        Frequencies of the lines, Hz, if the caller gave them.
     """
 
     def __init__(self, message: str, lines: NDArray[np.intp], freq_hz: NDArray[np.float64] | None = None) -> None:
@@ -42,19 +42,19 @@ class SingularLineError(np.linalg.LinAlgError):
         self.freq_hz = freq_hz
 
     def __reduce__(self) -> tuple[type[SingularLineError], tuple[object, ...]]:
-        """Return how to make it again in another process."""
+        """Return the arguments that create it again in another process."""
         return type(self), (str(self), self.lines, self.freq_hz)
 
 
 class FileContentError(ValueError):
-    """A file cannot be read, or lacks something; one line of bounded length, whatever the file is called."""
+    """A file cannot be read, or lacks something; one line of bounded length, for any name of the file."""
 
     def __init__(self, text: str) -> None:
         super().__init__(message(" ".join(text.splitlines())))
 
 
 class FileContentWarning(UserWarning):
-    """Something in a file had to be assumed or left out; one line of bounded length, whatever the file contains."""
+    """Something in a file was assumed or omitted; one line of bounded length, for any content of the file."""
 
     def __init__(self, text: str) -> None:
         super().__init__(message(" ".join(text.splitlines())))

@@ -1,4 +1,4 @@
-"""Packages that only some tasks need, and how to install them; what other packages add, by entry points."""
+"""Packages that only some tasks need, and how to install them; entry points of other packages."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["MissingPackageError", "check_extras", "extra_of", "import_extra", "l
 
 _T = TypeVar("_T")
 
-#: What each package is for, and the extra of the installation that brings it.
+#: Purpose of each package, and the extra of the installation that contains it.
 _EXTRAS = {
     "h5py": ("HDF5 files (MATLAB 7.3 among them)", "hdf5"),
     "openpyxl": ("Excel workbooks", "xlsx"),
@@ -36,29 +36,30 @@ _EXTRAS = {
 
 
 class MissingPackageError(ImportError):
-    """A package that only some tasks need is not installed; the message says how to install it."""
+    """A package that only some tasks need is not installed; the message states how to install it."""
 
 
 def import_extra(module: str) -> Any:
-    """Import a package, or a module of it, that is no requirement of the installation.
+    """Import a package, or a module of it, that is no requirement of the installation, and return it.
 
     Parameters
     ----------
     module : str
-        Such as ``h5py`` or ``matplotlib.figure``.
+        Name, such as ``h5py`` or ``matplotlib.figure``.
 
     Returns
     -------
     module
+        Imported module.
 
     Raises
     ------
     MissingPackageError
-        The package is not installed; the message says how to install it.
+        The package is not installed; the message states how to install it.
     """
     package = module.partition(".")[0]
     try:
-        # pyYeti sets how arrays print, also those of the program that reads a file by it; numpy is there by then.
+        # pyYeti changes how arrays print, also in the program that calls this function; numpy is imported by then.
         numpy = sys.modules.get("numpy")
         with nullcontext() if numpy is None else numpy.printoptions():
             return importlib.import_module(module)
@@ -79,28 +80,28 @@ def check_extras(*packages: str) -> None:
     for package in packages:
         try:
             is_found = importlib.util.find_spec(package) is not None
-        except ValueError:  # its entry of sys.modules is no module
+        except ValueError:  # the entry of sys.modules is no module
             is_found = False
         if not is_found:
             raise _missing(package)
 
 
 def plugins(group: str) -> list[EntryPoint]:
-    """Return what installed packages add to a group, such as ``jointfrf.formats``; nothing is loaded."""
+    """Return the entry points of installed packages in a group, such as ``jointfrf.formats``; nothing is loaded."""
     from importlib.metadata import entry_points
 
     return sorted(entry_points(group=group), key=lambda entry: (entry.name, entry.value))
 
 
 def load_plugin(entry: EntryPoint, is_right: Callable[[Any], bool], what: str) -> Any:
-    """Return what a plugin adds; its package is imported.
+    """Return the object of a plugin, after importing its package.
 
     Raises
     ------
     FileContentError
         It cannot be loaded, or is not `what` it must be.
     """
-    from jointfrf.errors import FileContentError  # imports numpy, which a command that only asks for help does not need
+    from jointfrf.errors import FileContentError  # imports numpy, which a command that only prints help does not need
 
     found = plugin_call(entry, lambda: entry.load())
     if not plugin_call(entry, lambda: is_right(found)):
@@ -114,7 +115,7 @@ def plugin_call(entry: EntryPoint, function: Callable[..., _T], *arguments: Any)
     Raises
     ------
     FileContentError
-        It raised an error of its own: none of a file that it was given, none of a missing package.
+        It raised an error that is not about a file it was given or a missing package.
     """
     from jointfrf.errors import FileContentError, first_line
 
@@ -122,7 +123,7 @@ def plugin_call(entry: EntryPoint, function: Callable[..., _T], *arguments: Any)
         return function(*arguments)
     except (FileContentError, MissingPackageError, MemoryError):
         raise
-    except (Exception, SystemExit) as error:  # of code that is not ours: any
+    except (Exception, SystemExit) as error:  # foreign code may raise any error
         if isinstance(error, OSError) and arguments:
             raise
         where = "".join(f"{one}: " for one in arguments if isinstance(one, Path))
@@ -135,7 +136,7 @@ def _plugin(entry: EntryPoint) -> str:
 
 
 def extra_of(package: str) -> str:
-    """Return the extra of the installation that brings a package."""
+    """Return the extra of the installation that contains a package."""
     return _EXTRAS[package][1]
 
 

@@ -35,31 +35,31 @@ __all__ = [
     "written_whole",
 ]
 
-#: Bytes of a file that show its format: the largest header is that of HDF5 after a block of 4 kB.
+#: Number of bytes of a file that show its format: the largest header is HDF5 after a block of 4 kB.
 HEAD = 1 << 13
-#: Says another limit, GB.
+#: Environment variable with another limit, GB.
 LIMIT_VARIABLE = "JOINTFRF_FILE_LIMIT_GB"
-#: Without one: the largest file, GB, about the memory of a workstation; and the memory of its content: GB that
-#: every machine has, or so many times the size of the file, as compressed FRFs may take, whichever is more.
+#: Limits without it: the largest file, GB, about the memory of a workstation; and the memory of its content, which is
+#: the larger of this many GB and this multiple of the size of the file, which compressed FRFs may take.
 _LARGEST, _SMALL, _TIMES = 16.0, 1.0, 10
-#: Bytes that each array, group or cell counts at least: a file may consist of millions of empty ones.
+#: Least number of bytes of each array, group or cell, because a file may consist of millions of empty ones.
 _LEAST = 10_000
-#: Files of a folder among which a name is sought.
+#: Number of files of a folder among which a name is searched.
 _LISTED = 10_000
-#: Characters that have a meaning to some file system, shell or page, and the longest name.
+#: Characters with a meaning to some file system, shell or page, and the longest name.
 _UNUSUAL, _LONGEST = re.compile(r"[^\w+,=.-]", re.ASCII), 100
-#: Names of devices on Windows, in every folder and with any suffix: what is written there is lost.
+#: Names of devices on Windows, in every folder and with any suffix: data written to them are lost.
 _DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.ASCII | re.IGNORECASE)
-#: Where names are those of open files, which cannot be replaced.
+#: Folders with names of open files, which cannot be replaced.
 _OPEN_FILES = "/proc/"
-#: What readers of numpy, scipy and h5py raise for a damaged file.
+#: Errors of readers of numpy, scipy and h5py for a damaged file.
 _DAMAGE = (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, OverflowError, MemoryError)
-#: Links to links that are followed, as many as Linux does.
+#: Number of links to links that are followed, as in Linux.
 _MOST_LINKS = 40
 
 
 def _limit_gb(given: float | None) -> float | None:
-    """Return the limit that was asked for, by a keyword or by the environment."""
+    """Return the limit given by a keyword or by the environment."""
     if given is not None:
         if not isinstance(given, int | float) or not given > 0:
             raise ValueError(f"limit_gb must be a number of GB above 0, not {given!r}")
@@ -76,20 +76,20 @@ def _limit_gb(given: float | None) -> float | None:
     return limit
 
 
-#: How a message about the limit ends.
+#: End of a message about the limit.
 _RAISED = f"raise this limit by limit_gb=, --limit-gb or the environment variable {LIMIT_VARIABLE}"
 
 
 class ReadLimit:
-    """The memory that the content of one file may take: a few kB can decompress to more than a machine has.
+    """Limit of memory for the content of one file: a few kB can decompress to more than a machine has.
 
     Parameters
     ----------
     path : Path
-        An existing file.
+        Name of an existing file.
     gb : float, optional
-        GB; the environment variable JOINTFRF_FILE_LIMIT_GB is used where it is not given. Without either 1 GB, or 10
-        times the size of the file where that is more.
+        Limit, GB. By default the environment variable JOINTFRF_FILE_LIMIT_GB; without it the larger of 1 GB and 10
+        times the size of the file.
     """
 
     def __init__(self, path: Path, gb: float | None = None) -> None:
@@ -99,17 +99,17 @@ class ReadLimit:
         self._taken = 0
 
     def take(self, size: int) -> None:
-        """Count what is about to be read.
+        """Count memory before it is used.
 
         Parameters
         ----------
         size : int
-            Bytes.
+            Number of bytes.
 
         Raises
         ------
         FileContentError
-            With all before it, it is more than the limit.
+            The sum exceeds the limit.
         """
         self._taken += max(size, _LEAST)
         if self._taken > self.bytes:
@@ -120,14 +120,14 @@ class ReadLimit:
 
 
 def check_stated(what: str, size: float) -> None:
-    """Check the memory that a number in a small file asks for, before the number is used.
+    """Check the memory that a number in a small file requires, before the number is used.
 
     Parameters
     ----------
     what : str
         File and number, for the message: ``case.toml: elements = 1000000``.
     size : float
-        Bytes.
+        Number of bytes.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def check_stated(what: str, size: float) -> None:
 
 
 def _near_name(path: Path) -> str:
-    """Return the end of a sentence that proposes a file of the same folder with nearly this name."""
+    """Return the end of a sentence that proposes a file of the same folder with a similar name."""
     try:
         listed = islice(path.parent.iterdir(), _LISTED)
         known = [one.name for one in listed if one.name.isprintable() and one.is_file()]
@@ -156,20 +156,21 @@ def _near_name(path: Path) -> str:
 
 
 def check_file(path: Path, limit_gb: float | None = None) -> None:
-    """Check that a file can be read to its end: that it is one, and not larger than memory is likely to hold.
+    """Check that a file is a regular file, and not larger than memory usually is.
 
     Parameters
     ----------
     path : Path
+        Name of the file.
     limit_gb : float, optional
-        GB; see `ReadLimit`.
+        Limit, GB; see `ReadLimit`.
 
     Raises
     ------
     FileNotFoundError
         There is no such file.
     FileContentError
-        It is a folder, a pipe or a device, or larger than 16 GB, or than another limit where one is given.
+        It is a folder, a pipe or a device, or larger than 16 GB, or than the given limit.
     """
     if not path.exists():
         raise FileNotFoundError("\\n".join(f"there is no file {path}{_near_name(path)}".splitlines()))
@@ -188,18 +189,19 @@ def _check_size(path: Path, size_bytes: int, limit_gb: float | None = None) -> N
 
 
 def head_of(path: Path, limit_gb: float | None = None) -> bytes:
-    """Return the first bytes of a file that holds something.
+    """Return the first bytes of a file that is not empty.
 
     Parameters
     ----------
     path : Path
+        Name of the file.
     limit_gb : float, optional
-        As in `check_file`.
+        Limit, GB; see `check_file`.
 
     Returns
     -------
     bytes
-        `HEAD` of them, or all there are.
+        First bytes, `HEAD` of them or all.
 
     Raises
     ------
@@ -221,19 +223,21 @@ def head_of(path: Path, limit_gb: float | None = None) -> bytes:
 
 @contextmanager
 def damage_named(path: Path, kind: str, *others: type[Exception]) -> Iterator[None]:
-    """Turn what libraries raise for a damaged file into one sentence that names the file.
+    """Turn errors of libraries for a damaged file into one sentence that names the file.
 
     Parameters
     ----------
     path : Path
+        Name of the file.
     kind : str
-        With its article: ``an NPZ file``.
+        Kind of the file with its article: ``an NPZ file``.
     *others : type
-        Errors of this kind of file, beside those that readers of any kind raise.
+        Errors for this kind of file, in addition to errors of readers of any kind.
 
     Raises
     ------
     FileContentError
+        The block raised one of these errors.
     """
     try:
         yield
@@ -244,7 +248,7 @@ def damage_named(path: Path, kind: str, *others: type[Exception]) -> Iterator[No
 
 
 def text_of(path: Path) -> str:
-    """Return the text of a file: UTF-16 where it begins so, else UTF-8, else Latin-1, as older programs write units.
+    """Return the text of a file: UTF-16 if it begins so, else UTF-8, else Latin-1, in which older programs write units.
 
     Raises
     ------
@@ -267,21 +271,21 @@ def text_of(path: Path) -> str:
 
 
 def clean_name(name: str, suffix: str = "") -> str:
-    """Return the name of a file for a text that may come from a stranger.
+    """Return the name of a file for a text of unknown origin.
 
     Parameters
     ----------
     name : str
-        Characters that are unusual in names of files (all but letters and digits of ASCII and ``_+,=.-``), a point at
-        the beginning, the end of a long name and names of devices on Windows are replaced; a checksum is then added, so
-        that two names stay two.
+        Text. Replaced are unusual characters (all except letters and digits of ASCII and ``_+,=.-``), a point at the
+        beginning, the end of a long name and names of devices on Windows. A checksum is then added, so that two names
+        stay different.
     suffix : str
         Suffix of the file, with its point.
 
     Returns
     -------
     str
-        A name without folders.
+        Name without folders.
 
     Examples
     --------
@@ -295,24 +299,24 @@ def clean_name(name: str, suffix: str = "") -> str:
     return f"{clean}{suffix}"
 
 
-#: Flags of `os.open`, those that this system has: a link is not followed, a pipe is not waited for.
+#: Flags of `os.open` on this system: a link is not followed, a pipe is not waited for.
 _READ = sum(getattr(os, name, 0) for name in ("O_RDONLY", "O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
 _CREATE = sum(getattr(os, name, 0) for name in ("O_WRONLY", "O_CREAT", "O_EXCL", "O_NOFOLLOW", "O_CLOEXEC", "O_BINARY"))
 _FOLDER = sum(getattr(os, name, 0) for name in ("O_RDONLY", "O_DIRECTORY", "O_CLOEXEC"))
-#: Whether files are opened relative to an open folder, which nobody can exchange for a link meanwhile.
+#: Whether files are opened relative to an open folder, which cannot be exchanged for a link meanwhile.
 _HAS_PLACES = os.open in os.supports_dir_fd and os.rename in os.supports_dir_fd
 
 
 @dataclass(frozen=True)
 class OwnFolder:
-    """A folder of results that may come from a stranger: no link in it is followed, to read or to write.
+    """A folder of results of unknown origin: no link in it is followed, for reading or writing.
 
     Attributes
     ----------
     base : Path
         Folder that the user named; it may be a link.
     inner : tuple of str
-        Folders in it, each in the one before; none of them may be a link.
+        Folders in it, each in the previous one; none of them may be a link.
     """
 
     base: Path
@@ -324,7 +328,7 @@ class OwnFolder:
 
     @property
     def path(self) -> Path:
-        """The path, for messages; opening it follows links."""
+        """Path for messages; opening it follows links."""
         return self.base.joinpath(*self.inner)
 
     def make(self) -> OwnFolder:
@@ -382,7 +386,7 @@ class OwnFolder:
 
     @contextmanager
     def written(self, name: str) -> Iterator[BinaryIO]:
-        """Give a new file to write into, and move it to its place at the end, as `written_whole` does.
+        """Yield a new file to write into, and move it to its place at the end, like `written_whole`.
 
         Raises
         ------
@@ -414,14 +418,14 @@ class OwnFolder:
                 raise
 
     def write(self, name: str, content: str | bytes) -> Path:
-        """Write a file whole or not at all, text as UTF-8, and return its path; errors as for `written`."""
+        """Write a file whole or not at all, text as UTF-8, and return its path; errors as in `written`."""
         with self.written(name) as file:
             file.write(content.encode("utf-8") if isinstance(content, str) else content)
         return self.path / name
 
     @contextmanager
     def _entered(self) -> Iterator[int | None]:
-        """Open the folder, each part in the one before; None where the system opens nothing relative to a folder."""
+        """Open the folder, each part in the previous one; None if the system opens nothing relative to a folder."""
         if not _HAS_PLACES:
             for depth in range(len(self.inner)):
                 part = self.base.joinpath(*self.inner[: depth + 1])
@@ -449,7 +453,7 @@ class OwnFolder:
             os.close(place)
 
     def _at(self, place: int | None, name: str) -> str:
-        """Return how functions of `os` name what is directly in the folder."""
+        """Return the name of an entry of the folder for functions of `os`."""
         if not name or Path(name).name != name:
             raise ValueError(f"{name!r} is not a name: make one by clean_name")
         return name if place is not None else str(self.path / name)
@@ -462,7 +466,7 @@ class OwnFolder:
 
 @contextmanager
 def _named(path: Path, *names: str) -> Iterator[None]:
-    """Let errors of the system that name nothing, or one of these names, name this path."""
+    """Make errors of the system that name nothing, or one of these names, name this path."""
     try:
         yield
     except OSError as error:
@@ -478,18 +482,18 @@ def _check_own(path: Path, status: os.stat_result) -> None:
 
 
 def _not_own(path: Path, kind: str, wanted: str) -> FileContentError:
-    return FileContentError(f"{path} is {kind}, not {wanted} of its own: remove it; nothing is read or written there")
+    return FileContentError(f"{path} is {kind}, not {wanted}; remove it, because nothing is read or written there")
 
 
 def write_file(path: Path, content: str | bytes) -> None:
-    """Write a file beside its place and move it there: a reader finds the old one or the new one, never a part.
+    """Write a file whole or not at all: a reader finds the old one or the new one, never a part.
 
     Parameters
     ----------
     path : Path
-        As for `written_whole`.
+        Name of the file; see `written_whole`.
     content : str or bytes
-        Text is written as UTF-8.
+        Content; text is written as UTF-8.
 
     Raises
     ------
@@ -502,13 +506,13 @@ def write_file(path: Path, content: str | bytes) -> None:
 
 @contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
-    """Give a place beside a file for what is written in chunks, and move it there at the end.
+    """Yield a temporary name in the folder of a file, and move it to the file at the end.
 
     Parameters
     ----------
     path : Path
-        In a folder that exists. Where a link is, the file is replaced that it leads to. An older file leaves its mode
-        and its owner to the new one. A device or a pipe is not replaced: all is written into it at the end.
+        Name of the file, in a folder that exists. For a link, the target is replaced. The new file gets mode and owner
+        of an older one. A device or a pipe is not replaced: all is written into it at the end.
 
     Raises
     ------
@@ -534,7 +538,7 @@ def written_whole(path: Path) -> Iterator[Path]:
         with temporary.open("r+b") as file:
             os.fsync(file.fileno())
         if older is not None:
-            _keep(temporary, older)  # in the end: it may be a file that its owner cannot open
+            _keep(temporary, older)  # at the end, because its owner may not be able to open the file
         temporary.replace(target)
     except BaseException as error:
         if temporary is not None:
@@ -553,7 +557,7 @@ def _status(path: Path) -> os.stat_result | None:
 
 
 def _followed(path: Path) -> Path:
-    """Follow links to the file that is meant; not those of open files, which name no place."""
+    """Return the target of links, except for links of open files, which name no place."""
     for _ in range(_MOST_LINKS):
         if not path.is_symlink() or path.parent.resolve().as_posix().startswith(_OPEN_FILES):
             return path
@@ -562,14 +566,14 @@ def _followed(path: Path) -> Path:
 
 
 def _created(folder: Path, name: str, *, private: bool) -> Path:
-    """Create a file of a new name; the mask of the process, or what the folder says, gives its mode."""
+    """Create a file of a new name; the mask of the process, or the folder, determines its mode."""
     path = folder / _temporary_name(folder, name)
     os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600 if private else 0o666))
     return path
 
 
 def _temporary_name(folder: Path, name: str) -> str:
-    """Return a new name for a file that will be called `name`, no longer than the file system takes."""
+    """Return a new name for a file that will be called `name`, within the limit of the file system."""
     try:
         longest = os.pathconf(folder, "PC_NAME_MAX")
     except (AttributeError, OSError, ValueError):
@@ -581,7 +585,7 @@ def _temporary_name(folder: Path, name: str) -> str:
 
 
 def _keep(path: Path | int, older: os.stat_result) -> None:
-    """Give a file, or an open one, the owner and the mode of an older one; without the right to, its group or mode."""
+    """Copy owner and mode of an older file to a file, or an open one; without permission, its group or mode."""
     mode = stat.S_IMODE(older.st_mode)
     if hasattr(os, "chown"):
         for owner in (older.st_uid, -1):

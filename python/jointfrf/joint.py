@@ -35,18 +35,23 @@ class Joint:
     stiffness : array_like, shape (n,) or (n, n)
         Stiffness of each DOF, or the full matrix; N/m, rotational N m/rad.
     damping : array_like, shape (n,) or (n, n), optional
-        Viscous damping, N s/m, rotational N m s/rad.
+        Viscous damping, N s/m, rotational N m s/rad; none by default.
     dofs : sequence of str, optional
         Names of the DOFs, in any order.
     loss_factor : float or array_like, shape (n,)
-        Hysteretic loss factor eta of each DOF; eta_ab = sqrt(eta_a eta_b) for a full matrix.
+        Hysteretic loss factor eta of each DOF, default 0; eta_ab = sqrt(eta_a eta_b) for a full matrix.
     structural_damping : array_like, shape (n,) or (n, n), optional
-        Hysteretic damping H where loss factors cannot express it; N/m, rotational N m/rad.
+        Hysteretic damping H that loss factors cannot express; N/m, rotational N m/rad.
 
     Raises
     ------
     ValueError
         Shapes that do not agree, NaN or Inf, a negative loss factor.
+
+    See Also
+    --------
+    LawJoint : joint of laws, which may depend on frequency.
+    couple : FRFs of an assembly with a joint.
 
     Examples
     --------
@@ -93,22 +98,22 @@ class Joint:
 
     @property
     def hysteretic_stiffness(self) -> FloatArray:
-        """All hysteretic damping, sqrt(eta_a eta_b) K_ab + H_ab, shape (n, n), N/m or N m/rad."""
+        """Hysteretic damping, sqrt(eta_a eta_b) K_ab + H_ab, shape (n, n), N/m or N m/rad."""
         whole: FloatArray = self.stiffness * np.sqrt(np.outer(self.loss_factor, self.loss_factor))
         return whole + self.structural_damping
 
     def dynamic_stiffness(self, freq_hz: ArrayLike) -> ComplexArray:
-        """Complex joint stiffness K*(w).
+        """Return the complex joint stiffness K*(w).
 
         Parameters
         ----------
         freq_hz : array_like, shape (n_freq,)
-            Frequencies in Hz.
+            Frequencies, Hz.
 
         Returns
         -------
         ndarray, shape (n_freq, n, n)
-            N/m, rotational N m/rad.
+            Dynamic stiffness, N/m, rotational N m/rad.
         """
         freq = as_frequency(freq_hz)
         omega = 2 * np.pi * freq[:, None, None]
@@ -121,12 +126,12 @@ class Joint:
         Parameters
         ----------
         dofs : sequence of str
-            All of its DOFs.
+            Names of all its DOFs in the new order.
 
         Raises
         ------
         ValueError
-            Other names than those of its DOFs.
+            The names are not the names of its DOFs.
         """
         dofs = as_names("dofs", dofs)
         if len(dofs) != len(self.dofs) or set(dofs) != set(self.dofs):
@@ -141,12 +146,12 @@ class Joint:
         Parameters
         ----------
         offset : array_like, shape (3,)
-            From the present to the new reference points along x, y, z, m, the same on both sides.
+            Vector from the present to the new reference points along x, y, z, m, equal on both sides.
 
         Returns
         -------
         Joint
-            T^-T K T^-1, and the same of all damping, with T of `rigid_offset`: in general full matrices.
+            Joint with T^-T K T^-1, and the same of all damping, with T of `rigid_offset`: in general full matrices.
 
         Raises
         ------
@@ -170,47 +175,55 @@ class Joint:
         return Joint(k, c, self.dofs, structural_damping=h)
 
     def export(self, program: CardFormat, nodes: Sequence[int], **options: Unpack[CardOptions]) -> str:
-        """Write the joint as input of a finite-element program, in the units of the model.
+        """Return the joint as input of a finite-element program, in the units of the model.
 
         Parameters
         ----------
         program : {"abaqus", "calculix", "nastran", "ansys", "code_aster", "lsdyna", "subdyn"}
-            Whose input. Abaqus: SPRING2 (complex with hysteretic damping) and DASHPOT2, or MATRIX INPUT where DOFs are
-            coupled or nodes are away from the joint. CalculiX: SPRING2, SPRING1. Nastran: CBUSH and PBUSH, or DMIG
-            where DOFs are coupled. Ansys: MATRIX27. Code_Aster: DISCRET of K_TR_L and A_TR_L. LS-DYNA: a discrete beam,
-            or DMIG where DOFs are coupled or nodes are away from the joint. SubDyn: a spring element, no damping.
+            Name of the program:
+
+            - Abaqus: SPRING2 (complex with hysteretic damping) and DASHPOT2, or MATRIX INPUT if DOFs are coupled or
+              nodes are away from the joint
+            - CalculiX: SPRING2, SPRING1
+            - Nastran: CBUSH and PBUSH, or DMIG if DOFs are coupled
+            - Ansys: MATRIX27
+            - Code_Aster: DISCRET of K_TR_L and A_TR_L
+            - LS-DYNA: a discrete beam, or DMIG if DOFs are coupled or nodes are away from the joint
+            - SubDyn: a spring element, no damping
         nodes : sequence of two int
-            Nodes j on A and k on B. Directions are the global ones; Ansys takes the nodal coordinate systems.
+            Nodes j on A and k on B. Directions are the global ones; Ansys uses the nodal coordinate systems.
         element, number : int
-            (1) First number of the new elements; first number of property, type and real constants, and part of names.
+            First number of the new elements; first number of property, type and real constants, and part of names;
+            default 1.
         rotation_nodes : sequence of two int, optional
-            CalculiX only, and needed there for rotations: the ROT NODEs of rigid bodies whose REF NODEs are `nodes`.
+            Nodes ROT NODE of rigid bodies whose REF NODEs are `nodes`: CalculiX only, and needed there for rotations.
         damping : bool
-            Whether damping is written (by default it is).
+            Whether to write damping, default True.
         damping_nodes : int, optional
-            CalculiX only, and needed there for viscous damping: first number of the auxiliary nodes of dashpots, two
-            for each.
+            First number of the auxiliary nodes of dashpots, two for each: CalculiX only, and needed there for viscous
+            damping.
         full_matrix : bool
-            Whether matrices are written where springs would do: Abaqus, Nastran.
+            Whether to write matrices even if springs are sufficient: Abaqus, Nastran; default False.
         positions : array_like, shape (2, 3), optional
-            Where the two nodes are in the model, in its unit of length; rigid arms then lead from them to `points`.
+            Positions of the two nodes in the model, in its unit of length; rigid arms connect them with `points`.
         points : array_like, shape (3,) or (2, 3), optional
             Reference point of the joint, or one for each side j and k, in the same unit, with `positions`; by default
-            midway between the nodes. It is stated in a comment.
+            midway between the nodes. A comment states it.
         units : {"SI", "mm-t-s", "mm-kg-ms"}
-            Units of the model: m, N, s (default); mm, N, s; mm, kN, ms. Arms of more than 10 m are an error.
+            Units of the model: "SI" is m, N, s (default), "mm-t-s" is mm, N, s, and "mm-kg-ms" is mm, kN, ms. Arms of
+            more than 10 m are an error.
         faces : sequence of two sequences of int, optional
-            Nodes that follow the nodes j and k as rigid bodies: ``*RIGID BODY``, RBE2, CERIG. Without them, where nodes
-            are apart from the reference point, such cards are sketched in comments.
+            Nodes that follow the nodes j and k as rigid bodies: ``*RIGID BODY``, RBE2, CERIG. Without them, comments
+            contain a sketch of such cards if nodes are apart from the reference point.
         comments : sequence of str, optional
             Lines of comment before the input.
         connector : bool
-            Abaqus: a connector element where matrices, or springs, would be written: direct steady-state steps take no
-            matrices. Both sides have one reference point, and there is no hysteretic damping but in a table.
+            Whether Abaqus gets a connector element instead of matrices or springs, default False: direct steady-state
+            steps take no matrices. Both sides have one reference point, and hysteretic damping needs a table.
         table_hz : array_like, optional
             Frequencies of tables, Hz, above 0: Re K* and Im K*/w over frequency, for direct steady-state steps. Abaqus:
-            SPRING2 and DASHPOT2 with frequencies, or a connector element where DOFs are coupled or nodes are away from
-            the joint. Nastran: PBUSHT and TABLED1, not where DOFs are coupled. Code_Aster: a dictionary of DISCRET by
+            SPRING2 and DASHPOT2 with frequencies, or a connector element if DOFs are coupled or nodes are away from
+            the joint. Nastran: PBUSHT and TABLED1, not for coupled DOFs. Code_Aster: a dictionary of DISCRET by
             frequency.
 
         Returns
@@ -221,16 +234,16 @@ class Joint:
         Raises
         ------
         ValueError
-            DOFs whose names do not name a direction; matrices that are not symmetric; numbers out of range; what
-            the program does not support: hysteretic damping in CalculiX, Ansys and LS-DYNA, any damping in SubDyn,
+            DOFs whose names do not name a direction; matrices that are not symmetric; numbers out of range. The program
+            does not support the joint: hysteretic damping in CalculiX, Ansys and LS-DYNA, any damping in SubDyn,
             rotations of CalculiX without `rotation_nodes`.
 
         Notes
         -----
-        Forces are K* (u_j - u_k), DOF by DOF, between the reference points of the joint. Nodes that are elsewhere (or
-        apart) move them by rigid arms r, u_point = u + theta x r, and receive the moments r x f: T^T K* T. Without
-        `positions` the nodes are taken to be the reference points, with no arm between them; a CBUSH has arms of its
-        own, to the middle between its grids, and is the same joint where they coincide. Coupled springs of CalculiX:
+        Forces are K* (u_j - u_k), DOF by DOF, between the reference points of the joint. Nodes at other places move the
+        points by rigid arms r, u_point = u + theta x r, and receive the moments r x f. The stiffness between the nodes
+        is then T^T K* T. Without `positions` the nodes are the reference points, with no arm between them. A CBUSH has
+        arms to the middle between its grids, and is the same joint if these coincide. Coupled springs of CalculiX:
         K_ab q_a q_b with q = u_j - u_k is the sum of four springs, two of them negative.
 
         Examples
@@ -251,7 +264,7 @@ class Joint:
         <BLANKLINE>
         """
         matrices = self.stiffness, self.damping, self.hysteretic_stiffness
-        from jointfrf.io.cards import spring_cards, table_cards  # readers of files take their time to import
+        from jointfrf.io.cards import spring_cards, table_cards  # importing readers of files is slow
 
         if (table_hz := options.get("table_hz")) is not None:
             freq = as_real("table_hz", table_hz, (None,))

@@ -1,4 +1,4 @@
-"""Words of messages: a proposal for a misspelt word, the first few of many, escaped characters, a bound of length."""
+"""Words of messages: a proposal for a misspelt word, the first few of many, escaped characters, bounded length."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ __all__ = ["LONGEST_MESSAGE", "cut", "did_you_mean", "look_alike", "message", "s
 #: Categories of invisible characters, which a terminal, a card or a page may interpret.
 _UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 
-#: Most characters of a message, whatever a file or a study of a stranger contains.
+#: Largest number of characters of a message, for any content of a file or a study.
 LONGEST_MESSAGE = 2000
 
 
 def cut(text: str, most: int = LONGEST_MESSAGE) -> str:
-    """Return a text, or the beginning and the end of one that is too long: the remedy stands at the end.
+    """Return a text, or the beginning and the end of one that is too long, because the remedy is at the end.
 
     Examples
     --------
@@ -42,7 +42,7 @@ def look_alike(word: str, known: Iterable[str]) -> str:
     >>> look_alike("identfy", ["check", "identify"]), look_alike("no", ["check", "identify"])
     ('identify', '')
     """
-    import difflib  # only where something is misspelt
+    import difflib  # only for a misspelt word
 
     by_lower = {name.lower(): name for name in known}
     found = difflib.get_close_matches(word.lower(), list(by_lower), 1)
@@ -63,7 +63,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def some_of(names: Sequence[object], most: int, between: str = ", ") -> str:
-    """Return the first of some names, and how many more there are.
+    """Return the first of some names, and the number of further ones.
 
     Examples
     --------
@@ -76,13 +76,14 @@ def some_of(names: Sequence[object], most: int, between: str = ", ") -> str:
 
 
 def visible(text: str, keep: str = "") -> str:
-    r"""Return a text of a file with invisible characters escaped, such as those that move a cursor.
+    r"""Return a text of a file with invisible characters escaped, such as characters that move a cursor.
 
     Parameters
     ----------
     text : str
+        Text to print.
     keep : str
-        Those that stay: ``"\n"`` where lines are meant.
+        Characters that stay: ``"\n"`` for several lines.
 
     Examples
     --------

@@ -358,13 +358,13 @@ MECHANISMS: dict[str, list[Change]] = {
     "averages over kinds of damping": [Change(fit.DofDamping, "by_scores", _best_kind)],
     "M as expected": [Change(on_manifold, "prior_of_m", _constant(None)), _IN_PYTHON],
     "lines left out": [Change(group_fit._LinesUsed, "near", _all_lines), _IN_PYTHON],
-    "other starts of far lines": [Change(group_fit, "_rescued", lambda _: lambda data, c, on: on), _IN_PYTHON],
+    "other starts of far lines": [Change(group_fit, "_restarted", lambda _: lambda data, c, on: on), _IN_PYTHON],
     "smooth point of linearisation": [Change(on_manifold, "project", _of_measured), _IN_PYTHON],
     "step length": [
         Change(group_fit._StepLength, "of", lambda _: lambda self, step, information, *, is_lost: 1.0), _IN_PYTHON,
     ],
     "softer point of linearisation": [
-        Change(DiagonalJoint, "within_sight", lambda _: lambda self, minimum, x: x), _IN_PYTHON,
+        Change(DiagonalJoint, "linearisation_point", lambda _: lambda self, minimum, x: x), _IN_PYTHON,
     ],
     "reference springs": [Change(on_manifold.LineData, "with_springs", lambda _: lambda self: self)],
     "further initial values": [Change(group_fit, "fit_dofs", _first_only)],

@@ -27,7 +27,7 @@ __all__ = [
 ]
 
 Band = tuple[float, float]
-#: Most lines of a chunk of a long sweep: memory for intermediate results does not grow with the lines.
+#: Largest number of lines in a chunk of a long sweep: memory for intermediate results does not grow with the lines.
 PIECE = 8192
 
 
@@ -49,7 +49,7 @@ def spread_lines(n_freq: int) -> slice:
 
 
 def line_slices(n_freq: int, most: int | None = None) -> list[slice]:
-    """Cut lines into chunks of about equal length, `most` at most, `PIECE` by default.
+    """Return chunks of lines of about equal length, at most `most` lines each, by default `PIECE`.
 
     Examples
     --------
@@ -67,15 +67,16 @@ def line_slices(n_freq: int, most: int | None = None) -> list[slice]:
 def in_pieces(
     n_freq: int, of_lines: Callable[[slice], Sequence[NDArray[Any]]], most: int | None = None
 ) -> list[NDArray[Any]]:
-    """Compute arrays of all lines in chunks: the memory beside them is that of one chunk.
+    """Return arrays of all lines, computed in chunks: additional memory is needed for one chunk only.
 
     Parameters
     ----------
     n_freq : int
+        Number of lines.
     of_lines : callable
-        From a slice of the lines to arrays whose first axis is theirs.
+        Function from a slice of the lines to arrays whose first axis is the lines.
     most : int, optional
-        Most lines of a chunk, `PIECE` by default.
+        Largest number of lines in a chunk, default `PIECE`.
 
     Examples
     --------
@@ -98,23 +99,28 @@ def in_pieces(
 
 
 def in_bands(freq_hz: ArrayLike, bands: Sequence[Band]) -> NDArray[np.bool_]:
-    """Which lines lie in any of the bands, limits included.
+    """Return which lines are in any of the bands, limits included.
 
     Parameters
     ----------
     freq_hz : array_like, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     bands : sequence of (low, high)
-        Hz.
+        Bands, Hz.
 
     Returns
     -------
     ndarray of bool, shape (n_freq,)
+        Whether each line is in a band.
 
     Raises
     ------
     ValueError
-        A band is not (low, high), or holds no line.
+        A band is not (low, high), or contains no line.
+
+    See Also
+    --------
+    as_bands : bands of each DOF.
 
     Examples
     --------
@@ -147,16 +153,16 @@ def _pairs(bands: object) -> list[Band]:
 def as_bands(
     bands: Band | Sequence[Band] | Mapping[str, Band | Sequence[Band]] | None, dofs: Sequence[str], freq_hz: FloatArray
 ) -> list[list[Band]]:
-    """Bands of each DOF from an argument: nothing (all lines), one band, several, or one of these for each DOF.
+    """Return the bands of each DOF from an argument: nothing (all lines), one band, several, or these by DOF.
 
     Parameters
     ----------
     bands : None, (low, high), sequence of (low, high), or mapping of DOF name to these
-        Hz. A sequence holds bands that serve all DOFs together.
+        Bands, Hz. A sequence contains bands that all DOFs share.
     dofs : sequence of str
         Names of the DOFs.
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
 
     Returns
     -------
@@ -167,6 +173,11 @@ def as_bands(
     ------
     ValueError
         A name that is not a DOF, a DOF without a band, a band without lines.
+
+    See Also
+    --------
+    in_bands : lines in bands.
+    propose_bands : bands of high sensitivity.
 
     Examples
     --------
@@ -214,29 +225,37 @@ def band_mean(
     bands: Band | Sequence[Band] | Mapping[str, Band | Sequence[Band]] | None = None,
     dofs: Sequence[str] | None = None,
 ) -> BandMean:
-    """Mean of Re K* and Im K*/w of each DOF over its sensitive band, as the thesis does.
+    """Return the mean of Re K* and Im K*/w of each DOF over its sensitive band, as in the thesis.
 
     Parameters
     ----------
     freq_hz : array_like, shape (n_freq,)
-        Hz; a line at 0 Hz cannot give a damping.
+        Frequencies, Hz; a line at 0 Hz cannot give a damping.
     k_joint : array_like, shape (n_freq, n, n)
-        Identified K*.
-    bands, dofs
-        As in `as_bands`; names ``"0"``, ``"1"``, ... by default.
+        Identified K*, N/m.
+    bands : None, (low, high), sequence of (low, high), or mapping of DOF name to these
+        Bands, Hz, see `as_bands`.
+    dofs : sequence of str, optional
+        Names of the DOFs, default ``"0"``, ``"1"``, ...
 
     Returns
     -------
     BandMean
+        Stiffness and damping of each DOF.
 
     Raises
     ------
     ValueError
         Wrong shapes, bands without lines, 0 Hz inside a band.
 
+    See Also
+    --------
+    identify_band_mean : the same from FRFs.
+    identify : maximum likelihood, without this bias.
+
     Notes
     -----
-    The mean of an inverse of noise: where the noise exceeds the joint's compliance, k and c shrink to zero.
+    The mean of an inverse of noise is biased: if the noise exceeds the joint's compliance, k and c shrink to zero.
 
     Examples
     --------
@@ -264,28 +283,34 @@ def band_mean(
 
 
 def peak(h: ArrayLike, freq_hz: ArrayLike, band: Band | None = None, *, refine: bool = False) -> tuple[float, float]:
-    """Largest modulus of an FRF in a band and its frequency.
+    """Return the largest modulus of an FRF in a band and its frequency.
 
     Parameters
     ----------
     h : array_like, shape (n_freq,)
         One FRF.
     freq_hz : array_like, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     band : (low, high), optional
-        Hz; all lines by default.
+        Band, Hz; all lines by default.
     refine : bool
-        Whether the peak is sought between the lines, by a parabola through the logarithms of the three highest.
+        Whether to interpolate between the lines, by a parabola through the logarithms of the three highest; default
+        False.
 
     Returns
     -------
     amplitude, frequency : float
-        In the unit of `h`, and Hz.
+        Modulus in the unit of `h`, and frequency, Hz.
 
     Raises
     ------
     ValueError
         Shapes that do not agree, a band without lines, NaN; with `refine`, neighbours at the same frequency.
+
+    See Also
+    --------
+    has_peak : whether a band contains a peak.
+    amplitude_error, frequency_error : errors of a peak.
 
     Examples
     --------
@@ -299,7 +324,7 @@ def peak(h: ArrayLike, freq_hz: ArrayLike, band: Band | None = None, *, refine: 
         return float(amplitude[at]), float(freq[at])
     if np.unique(freq[at - 1 : at + 2]).size < 3:
         raise ValueError(f"freq_hz: lines {at - 1} to {at + 1} are not at three frequencies, as refine needs them")
-    # In parts of the larger step: squares of steps of any size, where LAPACK would search for ever, have no place here.
+    # In parts of the larger step, because squares of steps of any size could make LAPACK iterate without end.
     steps = freq[at - 1 : at + 2] - freq[at]
     width = abs(steps).max()
     parabola = np.polyfit(steps / width, np.log(amplitude[at - 1 : at + 2]), 2)
@@ -308,25 +333,30 @@ def peak(h: ArrayLike, freq_hz: ArrayLike, band: Band | None = None, *, refine: 
 
 
 def has_peak(h: ArrayLike, freq_hz: ArrayLike, band: Band) -> bool:
-    """Whether an FRF has a peak in a band: its largest modulus there does not lie on the first or the last line.
+    """Return whether an FRF has a peak in a band: its largest modulus is not on the first or the last line.
 
     Parameters
     ----------
     h : array_like, shape (n_freq,)
         One FRF.
     freq_hz : array_like, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     band : (low, high)
-        Hz.
+        Band, Hz.
 
     Returns
     -------
     bool
+        Whether there is a peak.
 
     Raises
     ------
     ValueError
-        As in `peak`.
+        An error of `peak`.
+
+    See Also
+    --------
+    peak : the peak itself.
 
     Examples
     --------
@@ -340,10 +370,10 @@ def has_peak(h: ArrayLike, freq_hz: ArrayLike, band: Band) -> bool:
 
 
 def _largest(h: ArrayLike, freq: FloatArray, band: Band | None) -> tuple[FloatArray, NDArray[np.intp], np.intp]:
-    """Return the modulus of an FRF, the lines inside the band, and the one where it is largest there."""
+    """Return the modulus of an FRF, the lines inside the band, and the line of its largest value there."""
     amplitude: FloatArray = np.abs(as_values("h", h, freq.size))
     if not np.isfinite(amplitude).all():
-        raise ValueError(f"h holds NaN or Inf in line {int(np.argmin(np.isfinite(amplitude)))}")
+        raise ValueError(f"h contains NaN or Inf in line {int(np.argmin(np.isfinite(amplitude)))}")
     inside = np.arange(freq.size) if band is None else np.flatnonzero(in_bands(freq, [band]))
     if inside.size == 0:
         raise ValueError("h has no lines")
@@ -353,24 +383,29 @@ def _largest(h: ArrayLike, freq: FloatArray, band: Band | None) -> tuple[FloatAr
 def amplitude_error(
     h_exact: ArrayLike, h: ArrayLike, freq_hz: ArrayLike, band: Band | None = None, *, refine: bool = False
 ) -> float:
-    """Relative difference of the largest amplitudes in a band, percent (4.11).
+    """Return the relative difference of the largest amplitudes in a band, percent (4.11).
 
     Parameters
     ----------
     h_exact, h : array_like, shape (n_freq,)
         Exact and regenerated FRF.
     freq_hz, band, refine
-        As in `peak`.
+        Frequencies and band, Hz, and interpolation; see `peak`.
 
     Returns
     -------
     float
-        Percent.
+        Error, percent.
 
     Raises
     ------
     ValueError
-        As in `peak`; the exact FRF is zero.
+        An error of `peak`; the exact FRF is zero.
+
+    See Also
+    --------
+    frequency_error : error of the frequency.
+    validate : errors of all FRFs of an assembly.
 
     Examples
     --------
@@ -387,24 +422,30 @@ def amplitude_error(
 def frequency_error(
     h_exact: ArrayLike, h: ArrayLike, freq_hz: ArrayLike, band: Band | None = None, *, refine: bool = False
 ) -> float:
-    """Relative difference of the frequencies of the largest amplitudes in a band, percent (4.12).
+    """Return the relative difference of the frequencies of the largest amplitudes in a band, percent (4.12).
 
     Parameters
     ----------
     h_exact, h : array_like, shape (n_freq,)
         Exact and regenerated FRF.
     freq_hz, band, refine
-        As in `peak`. Without `refine` the error is a multiple of the spacing of the lines.
+        Frequencies and band, Hz, and interpolation; see `peak`. Without `refine` the error is a multiple of the spacing
+        of the lines.
 
     Returns
     -------
     float
-        Percent.
+        Error, percent.
 
     Raises
     ------
     ValueError
-        As in `peak`; the exact FRF is largest at 0 Hz.
+        An error of `peak`; the exact FRF is largest at 0 Hz.
+
+    See Also
+    --------
+    amplitude_error : error of the amplitude.
+    validate : errors of all FRFs of an assembly.
 
     Examples
     --------

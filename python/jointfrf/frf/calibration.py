@@ -1,4 +1,4 @@
-"""Errors of channels, set-ups and single FRFs that are smooth over frequency, by FRFs that were measured twice."""
+"""Errors of channels, set-ups and single FRFs that are smooth over frequency, from FRFs that were measured twice."""
 
 from __future__ import annotations
 
@@ -28,40 +28,42 @@ from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
 __all__ = ["CalibrationErrors", "ErrorKind", "SetUpErrors", "calibration_errors", "shows_calibration"]
 
-#: Functions of frequency that may be calibration, about as slow as an eighth of the band; as many faster ones show the
-#: noise. Lines that each needs.
+#: Number of functions of frequency that may be calibration, about as slow as an eighth of the band; the same number of
+#: faster ones shows the noise. Number of lines that each needs.
 _SLOW, _LINES = 8, 20
-#: Polynomials of which the square of frequency is made.
+#: Number of polynomials that represent the square of frequency.
 _OF_SQUARES = 3
-#: Probability at which a sum of squares that exceeds that of noise is taken for chance: sixteen sums are looked at, so
-#: that calibration is seen where there is none in 1.6 % of the tests.
+#: Probability above which a sum of squares in excess of the noise is chance: with sixteen sums, 1.6 % of tests without
+#: calibration errors show one.
 _CHANCE = 0.001
-#: A set-up is named where it is off by so many standard errors: by chance one of 1500 is.
+#: Deviation of a set-up, in standard errors, above which it is named: by chance one of 1500 is.
 _NAMED = 3.4
 #: Singular values below this share of the largest are zero.
 _RANK = 1e-9
 
 
-#: What an error is one of: all FRFs of a response or of a force, a single FRF, those of a set-up, all.
+#: Owner of an error: all FRFs of a response or of a force, a single FRF, all FRFs of a set-up, all FRFs.
 ErrorKind = Literal["channel", "own", "setup", "common"]
 
 
 class SetUpDeviation(NamedTuple):
-    """What a set-up differs from the mean of all by.
+    """Deviation of a set-up from the mean of all.
 
     Attributes
     ----------
     name : str
+        Name of the set-up.
     part : {"gain", "phase", "resonances"}
+        Kind of the deviation.
     size, error : float
-        Where the deviation is largest, relative or in rad, and its standard error there; of resonances, by how much of
-        their frequency they are higher.
+        Largest deviation, relative or in rad, and its standard error there; for resonances, their relative increase in
+        frequency.
     band : (float, float)
-        Where FRFs deviate by more than half of what they do at most, Hz.
+        Band in which FRFs deviate by more than half of the largest deviation, Hz.
     delay : float
-        Of a phase that is proportional to frequency, s; NaN of others.
+        Delay of a phase that is proportional to frequency, s; NaN for other deviations.
     change : float
-        Largest relative change of FRFs; of resonances the median over those that were measured twice.
+        Largest relative change of FRFs; for resonances the median over FRFs that were measured twice.
     """
 
     name: str
@@ -75,19 +77,20 @@ class SetUpDeviation(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SetUpErrors:
-    """Relative errors that the FRFs of a set-up have in common, and those that all set-ups have.
+    """Relative errors that the FRFs of a set-up have in common, and errors that all set-ups have.
 
     Attributes
     ----------
     setups : SetUps
+        Set-ups of the FRFs.
     variance, degrees : ndarray, shape (2, n_functions)
-        Of the errors of one set-up, gain and phase, and degrees of freedom of these.
+        Variance of the errors of one set-up, gain and phase, and its degrees of freedom.
     common : float
-        Variance of a gain that all FRFs share, as was said.
+        Stated variance of a gain that all FRFs share.
     deviations : tuple of SetUpDeviation
         Set-ups that differ from the mean by more than chance.
     exceeds : bool
-        Whether gains differ by more than was said.
+        Whether gains differ by more than the stated deviation.
     """
 
     setups: SetUps
@@ -113,29 +116,30 @@ class CalibrationErrors:
     Attributes
     ----------
     span : (float, float)
-        Hz.
+        Frequency range, Hz.
     channel : ndarray, shape (2, n_functions)
-        Variance of g_p - f_p, of gain and of phase, the same for all channels; 0 where it is not significant.
+        Variance of g_p - f_p, of gain and of phase, the same for all channels; 0 if it is not significant.
     own : ndarray, shape (2, n_functions)
-        Variance of e_pq, likewise.
+        Variance of e_pq, of gain and of phase; 0 if it is not significant.
     channel_degrees, own_degrees : ndarray, shape (2, n_functions)
         Degrees of freedom of these variances.
     rows, columns : ndarray of int, shape (n_pairs,)
+        Entries p, q of the pairs.
     differences : ndarray, shape (n_pairs, 2, n_functions)
         Significant factors of (h_pq - h_qp) over the mean of both.
     setups : SetUpErrors, optional
-        Where the FRFs are of several set-ups, or a gain that all share was said.
+        Errors of set-ups, if the FRFs have several set-ups, or a stated common gain.
     resonant : bool
-        Whether the gains of channels differ by the square of frequency and nothing else, as those of sensors do that
-        resonate far above the band.
+        Whether the gains of channels differ only by the square of frequency, like gains of sensors that resonate far
+        above the band.
 
     Notes
     -----
-    The functions of the gain are Legendre polynomials; those of the phase a delay, which is proportional to frequency,
-    and polynomials that are orthogonal to it. Where sensors are resonant the first function of the gain is the square
-    of frequency, the others are orthogonal to it. Such errors have one sign: their mean over the channels, which no
-    difference shows, is as large as their scatter where half of the sensors resonate. It is an error of all FRFs with
-    the variance of g_p - f_p.
+    The functions of the gain are Legendre polynomials. The functions of the phase are a delay, which is proportional to
+    frequency, and polynomials that are orthogonal to it. If sensors are resonant, the first function of the gain is the
+    square of frequency, and all further ones are orthogonal to it. Such errors have one sign. Their mean over the
+    channels, which no difference shows, is as large as their scatter if half of the sensors resonate. It is an error of
+    all FRFs with the variance of g_p - f_p.
     """
 
     span: tuple[float, float]
@@ -159,13 +163,13 @@ class CalibrationErrors:
         if self.setups is not None:
             variance[0, 0] = self.setups.common
         if self.resonant:
-            # The delay is that of the damping of the same resonance, unless phases differ by more.
+            # The delay follows from the damping of the same resonance, unless phases differ by more.
             for part in (0,) if self.channel[1, 1:].any() else (0, 1):
                 variance[part, 0], degrees[part, 0] = self.channel[part, 0], self.channel_degrees[part, 0]
         return variance, degrees
 
     def resonance(self) -> float:
-        """Return at which frequency, Hz, one of the most different two sensors resonates; inf where none is seen."""
+        """Return the resonance frequency, Hz, of one of the most different two sensors; inf if there is none."""
         if not self.resonant:
             return np.inf
         most = float(abs(self.differences[:, 0, 0]).max())
@@ -179,7 +183,7 @@ class CalibrationErrors:
         return np.asarray(np.einsum("ab,abl->l", variance, self.functions(freq_hz) ** 2))
 
     def without(self, freq_hz: FloatArray, h: ComplexArray) -> ComplexArray:
-        """Return FRFs less the half of their smooth differences."""
+        """Return FRFs minus half of their smooth differences."""
         gain, phase = self.functions(freq_hz)
         relative = self.differences[:, 0] @ gain + 1j * (self.differences[:, 1] @ phase)
         p, q = self.rows, self.columns
@@ -190,9 +194,9 @@ class CalibrationErrors:
         return left
 
     def kinds(self) -> list[tuple[ErrorKind, FloatArray, FloatArray]]:
-        """Return what errs, with variances and degrees of freedom by function, without what has none.
+        """Return the kinds of errors, with variances and degrees of freedom by function, without kinds of variance 0.
 
-        Of responses and of forces, each with half the variance of their difference; of single FRFs; of set-ups; of all.
+        Kinds are responses and forces, each with half the variance of their difference, single FRFs, set-ups, and all.
         """
         found: list[tuple[ErrorKind, FloatArray, FloatArray]] = [
             ("channel", self.channel / 2, self.channel_degrees),
@@ -204,7 +208,7 @@ class CalibrationErrors:
         return [one for one in found if one[1].any()]
 
     def masks(self, kind: ErrorKind, shape: tuple[int, int]) -> NDArray[np.bool_]:
-        """Return which FRFs, of this shape, each error of a kind is one of, shape (n_errors, n_responses, n_forces)."""
+        """Return the FRFs of each error of a kind, shape (n_errors, n_responses, n_forces), for FRFs of this shape."""
         if kind == "setup" and self.setups is not None:
             return self.setups.masks()
         if kind == "common":
@@ -229,33 +233,38 @@ def calibration_errors(
     reciprocal: bool = True,
     known: tuple[ReciprocityDifferences, FloatArray] | None = None,
 ) -> CalibrationErrors | None:
-    """Find the variances of smooth errors of FRFs that were measured twice: both ways, or in two set-ups.
+    """Return the variances of smooth errors of FRFs that were measured twice: both ways, or in two set-ups.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     h : ndarray, shape (n_freq, m_r, m_f)
+        Measured FRFs.
     setups : SetUps, optional
+        Set-up of each FRF.
     reciprocal : bool
         Whether responses and forces are the same channels of a reciprocal structure.
     known : (ReciprocityDifferences, ndarray), optional
-        Differences of lines that rise in frequency, and the variance of h by their parts; of no set-ups.
+        Differences on lines in rising order, and the variance of h by their parts; not for set-ups.
 
     Returns
     -------
     CalibrationErrors or None
-        None where differences are those of noise, or there are none, or there are few lines; not of several set-ups.
+        Errors; None if differences are noise, or there are none, or there are few lines; not for several set-ups.
 
     Notes
     -----
-    Differences of each pair are fitted by least squares, weighted by their noise, and the factors split one after the
-    other into those of set-ups, u_s - u_t, of channels, u_p - u_q with u = g - f, and what does not close, e_pq - e_qp.
-    Noise has the same squares in slow functions as in faster ones, however far neighbouring lines correlate, unless
-    that is over a good part of the band: sums of squares of slow functions of about one speed are compared with those
-    of the faster half, each level with itself, as noise that is common to a hit is. Those that exceed them by more than
-    chance give the variances. Gains and delays of set-ups are tested by nothing: few set-ups may agree by chance, and
-    their squares over their few degrees of freedom, n - 1 of n set-ups, are then the variance that their mean has.
+    Differences of each pair are fitted by least squares, weighted by their noise. The factors are split, one after the
+    other, into set-ups, u_s - u_t, channels, u_p - u_q with u = g - f, and the remainder, e_pq - e_qp.
+
+    Noise has the same squares in slow functions as in faster ones, for any correlation of neighbouring lines that is
+    short compared with the band. Sums of squares of slow functions of about one speed are therefore compared with sums
+    of the faster half, each level with itself, because noise may be common to an impact. Sums that exceed them by more
+    than chance give the variances.
+
+    Gains and delays of set-ups are not tested, because a few set-ups may agree by chance. Their squares over their few
+    degrees of freedom, n - 1 for n set-ups, are the variance of their mean.
     """
     freq = freq_hz
     if known is None:
@@ -270,7 +279,7 @@ def calibration_errors(
         again = setups if setups is None else setups.on_lines(lines)
         differences = _differences(h, again, reciprocal=reciprocal)
     if differences is None:
-        return _as_said(span, setups)
+        return _stated_errors(span, setups)
     said = None if setups is None else setups.gain
     factors = _factors(differences, span, freq, 2 * n_slow)
     variance, degrees, exceeds = _split(factors, differences, n_slow, said)
@@ -300,9 +309,9 @@ def calibration_errors(
 def _split(
     factors: _Factors, differences: _Differences, n_slow: int, said: float | None
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """Return variances and degrees of freedom of set-ups, channels and FRFs, and whether set-ups exceed what was said.
+    """Return variances and degrees of freedom of set-ups, channels and FRFs, and whether set-ups exceed stated ones.
 
-    Of shape (3, 2, n_slow): gain and phase of each.
+    Shapes are (3, 2, n_slow): gain and phase of each.
     """
     by_noise = _squares(factors, 1 / factors.variance, differences)
     found = np.zeros((2, 3, 2, n_slow))
@@ -313,7 +322,7 @@ def _split(
 
     @cache
     def sized() -> FloatArray:
-        # Errors far above the noise count alike, however small the noise of a pair is.
+        # Errors far above the noise have equal weight, however small the noise of a pair is.
         alike = _squares(factors, np.ones((len(factors.value), 1, 1)), differences)
         return np.asarray(np.add.reduceat(alike[..., :n_slow], first, axis=3))
 
@@ -330,8 +339,8 @@ def _split(
     return found[0], found[1], exceeds
 
 
-def _as_said(span: tuple[float, float], setups: SetUps | None) -> CalibrationErrors | None:
-    """Return errors of gain that were said, where no FRFs show any."""
+def _stated_errors(span: tuple[float, float], setups: SetUps | None) -> CalibrationErrors | None:
+    """Return stated errors of gain, if no FRFs show any."""
     if setups is None or (setups.gain is None and not setups.common_gain):
         return None
     variance, none, no_pairs = np.array([[(setups.gain or 0.0) ** 2], [0.0]]), np.zeros((2, 1)), np.zeros(0, np.intp)
@@ -374,20 +383,20 @@ def _mixtures(span: tuple[float, float], resonant: bool) -> FloatArray:
 
 
 class _Differences(NamedTuple):
-    """Differences of FRFs that were measured twice, and what they hold of channels and set-ups.
+    """Differences of FRFs that were measured twice, and their channels and set-ups.
 
     Attributes
     ----------
     rows, columns : ndarray, shape (n_pairs,)
-        Of the first of both.
+        Entry of the first FRF of each pair.
     values, mean : ndarray, shape (n_pairs, n_freq)
-        h_one - h_other, and their mean.
+        Differences h_one - h_other, and their mean.
     noise : ndarray, shape (n_pairs, n_freq)
         Variance of the differences.
     of_channels, of_setups : ndarray, shape (n_pairs, m), (n_pairs, n_setups)
-        How often each enters a difference.
+        Coefficient of each channel and set-up in a difference.
     is_reciprocity : ndarray of bool, shape (n_pairs,)
-        h_pq and h_qp, not one FRF of two set-ups.
+        Whether the pair is h_pq and h_qp, not one FRF of two set-ups.
     """
 
     rows: NDArray[np.intp]
@@ -410,7 +419,7 @@ def _of_directions(h: ComplexArray, both: ReciprocityDifferences, variance: Floa
 
 
 def _of_channels(rows: NDArray[np.intp], columns: NDArray[np.intp], n_ways: int) -> FloatArray:
-    """Return how often channels enter differences, of which the first are those of both directions."""
+    """Return the coefficients of channels in differences; the first differences are between both directions."""
     found = np.zeros((len(rows), max(rows.max(), columns.max()) + 1))
     found[np.arange(n_ways), rows[:n_ways]] = 1
     found[np.arange(n_ways), columns[:n_ways]] = -1
@@ -418,7 +427,7 @@ def _of_channels(rows: NDArray[np.intp], columns: NDArray[np.intp], n_ways: int)
 
 
 def _differences(h: ComplexArray, setups: SetUps | None, *, reciprocal: bool) -> _Differences | None:
-    """Return the differences that there are; None where there are none."""
+    """Return the differences of FRFs that were measured twice; None if there are none."""
     both = reciprocity_differences(h, entry_groups(h, reciprocal=True)) if reciprocal else None
     if setups is None:
         near = near_squares(h)
@@ -458,11 +467,11 @@ class _Factors(NamedTuple):
     value, variance : ndarray, shape (n_pairs, 2, n_functions)
         Factors, and their variance if lines were independent.
     left : ndarray, shape (n_pairs, 2, n_freq)
-        Of the differences along and across h, over their noise.
+        Residual of the differences along and across h, over their noise.
     solve : callable
-        Returns factors of other differences, and what is left of them, by the same weights.
+        Function that returns factors of other differences, and their residual, by the same weights.
     turning : ndarray, shape (n_pairs, n_freq)
-        By which differences are turned and weighted; 0 on outlying lines.
+        Complex factor that rotates and weights differences; 0 on outlying lines.
     """
 
     value: FloatArray
@@ -484,7 +493,7 @@ def _factors(
     size = size * inverse
     gain = functions[0]
     of_gain = np.linalg.pinv((size[:, None] ** 2 * gain) @ gain.T, hermitian=True)
-    # The functions of the phase are those of the gain but for the first ones: one inverse serves both.
+    # The functions of phase and gain are equal except for the first ones, so that one inverse is sufficient.
     both, first = np.stack([of_gain, of_gain], axis=1), min(_OF_SQUARES, number)
     mixture = (of_phases @ of_gains.T)[:first, :first]
     both[:, 1, :first] = mixture @ both[:, 1, :first]
@@ -506,10 +515,10 @@ def _factors(
 
 
 def _squares(factors: _Factors, weight: FloatArray, differences: _Differences) -> FloatArray:
-    """Return weighted sums of squares of set-ups, channels, and what does not close, shape (3, 6, 2, n_functions).
+    """Return weighted sums of squares of set-ups, channels, and the remainder, shape (3, 6, 2, n_functions).
 
-    Each level beside those before, with its degrees of freedom, and what it is in the mean: by independent noise, and
-    by a unit of variance of each set-up, of each channel, and of each FRF.
+    Each level is orthogonal to the levels before. The entries are its sum, its degrees of freedom, and its means for
+    independent noise and for a unit of variance of each set-up, of each channel, and of each FRF.
     """
     # Pairs last; weights may be the same for all functions.
     w, value, noise = (np.moveaxis(one, 0, -1) for one in (weight, factors.value, factors.variance))
@@ -525,7 +534,7 @@ def _squares(factors: _Factors, weight: FloatArray, differences: _Differences) -
     for number, own in enumerate(weighted):
         if not own.any():
             continue
-        basis = _beside(own, taken)
+        basis = _orthogonal_part(own, taken)
         taken = np.concatenate([taken, basis], axis=-1)
         share = np.square(basis).sum(axis=-1)
         sums[number, 0] = np.square((of_all[..., None, :] @ basis)[..., 0, :]).sum(axis=-1)
@@ -535,13 +544,13 @@ def _squares(factors: _Factors, weight: FloatArray, differences: _Differences) -
             sums[number, 3 + unit] = np.square(basis.swapaxes(-1, -2) @ one).sum(axis=(-2, -1))
         sums[number, 5] = 2 * (share * w).sum(axis=-1)
     sums[2] = np.maximum(sums[2] - sums[0] - sums[1], 0)
-    # What does not close holds neither set-ups nor channels.
+    # The remainder contains no set-ups and no channels.
     sums[2, 3:5] = 0
     return sums
 
 
-def _beside(columns: FloatArray, taken: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of what columns hold beside a basis that is taken; zero columns fill it up."""
+def _orthogonal_part(columns: FloatArray, taken: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of the part of columns orthogonal to a given basis, padded by zero columns."""
     size = np.linalg.norm(columns, axis=(-2, -1))[..., None]
     left = columns - taken @ (taken.swapaxes(-1, -2) @ columns)
     u, value, _ = np.linalg.svd(left, full_matrices=False)
@@ -559,9 +568,9 @@ def _variances(
 ) -> FloatArray:
     """Return variance and degrees of freedom of set-ups, channels and FRFs, shape (2, 3), by sums of `_squares`.
 
-    By the first sums it is tested whether they exceed those of noise; those of all parts and functions, which are asked
-    for only where they do, give the size. Set-ups have the variance that was said, unless they exceed it; where none
-    was said, `always` takes what they have.
+    The first sums test whether they exceed sums of noise. The size follows from sums of all parts and functions, which
+    are computed only if they do. Set-ups have the stated variance, unless they exceed it. Without a stated variance,
+    `always` returns the estimate without a test.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         noise = np.where(reference[:, 1] > 0, reference[:, 0] / reference[:, 2], 0)
@@ -627,9 +636,9 @@ def _deviations(
 def _higher_resonances(
     factors: _Factors, differences: _Differences, setups: SetUps, freq_hz: FloatArray
 ) -> tuple[SetUpDeviation, ...]:
-    """Return the set-ups whose resonances are higher or lower than the mean: by masses of sensors, by temperature."""
+    """Return set-ups with higher or lower resonances than the mean, by masses of sensors or by temperature."""
     slope = freq_hz * np.gradient(differences.mean, freq_hz, axis=1)
-    # h(f / (1 + d)) = h - d f dh/df, beside gain and phase, with the level and the correlation of what it leaves.
+    # h(f / (1 + d)) = h - d f dh/df, with gain and phase, and with level and correlation of the residual.
     _, moved = factors.solve(-slope * factors.turning)
     information = np.maximum(np.square(moved).sum(axis=(1, 2)), TINY)
     higher = (factors.left * moved).sum(axis=(1, 2)) / information

@@ -1,4 +1,4 @@
-"""Impacts and sensors off axis: FRFs of a channel that contain a share of another joint DOF, found from reciprocity.
+"""Impacts and sensors off axis: FRFs of a channel with a share of another joint DOF, estimated from reciprocity.
 
 If impact q acts along its axis and with a share a_qd along joint DOF d of its side, its column is measured as
 h_pq + a_qd g_pd, with g_pd from a load at the DOF to response p; a sensor off axis does the same to its row. Then
@@ -31,22 +31,22 @@ from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
 __all__ = ["CrossAxis", "found_cross_axis"]
 
-#: Probability at which shares of other DOFs explain the differences of noise by chance: other errors resemble them.
+#: Probability below which shares of other DOFs explain differences better than noise does.
 _CHANCE = 1e-6
-#: Lines for each unknown at least, numbers of the least-squares problem at most, and turns of its weights.
+#: Lines for each unknown at least, largest size of the least-squares problem, and number of updates of its weights.
 _LINES_EACH, _MOST_NUMBERS, _TURNS = 4, 1_000_000, 3
 
 
 @dataclass(frozen=True, eq=False)
 class CrossAxis:
-    """Shares of other joint DOFs in channels, impact less sensor.
+    """Shares of other joint DOFs in channels, impact minus sensor.
 
     Attributes
     ----------
     channels, dofs : ndarray of int, shape (k,)
         Channel and joint DOF, of sides j, then k, of each share.
     share, std_error : ndarray, shape (k,)
-        a - b, relative to a unit load at the DOF, and standard error.
+        Difference a - b, relative to a unit load at the DOF, and its standard error.
     variance : ndarray, shape (k,)
         Variance of a - b: one of translations and one of rotations, if FRFs are in units of their root mean squares.
     alike : tuple of ndarray of int
@@ -54,7 +54,7 @@ class CrossAxis:
     size : ndarray, shape (k,)
         Root mean square of the FRFs that the share adds, relative to the FRFs of the channel.
     transform : ndarray, shape (2 n, m)
-        From channels to joint DOFs.
+        Matrix from channels to joint DOFs.
     """
 
     channels: NDArray[np.intp]
@@ -88,12 +88,12 @@ def found_cross_axis(
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     h, smooth : ndarray, shape (n_freq, m, m)
-        Receptances as measured and smooth, m/N, responses and forces at the same points. Noise of the FRFs that a share
-        adds, which the differences contain as well, would make a share.
+        Measured and smooth receptances, m/N, responses and forces at the same points. Smooth ones avoid that noise of
+        the FRFs that a share adds, which the differences contain as well, looks like a share.
     transform : ndarray, shape (2 n, m)
-        From channels to joint DOFs j, then k.
+        Matrix from channels to joint DOFs j, then k.
     rotations : ndarray of bool, shape (n,)
         Joint DOFs that are rotations.
     is_translation : bool
@@ -122,15 +122,15 @@ def found_cross_axis(
     of_dofs = smooth @ transform.T
     size_of_dof = np.sqrt(np.square(abs(of_dofs)).mean(axis=(0, 1)))
     channels, dofs = _shares(modes, size_of_dof, n)
-    beside = list(np.moveaxis(calibration_columns(freq, h, differences), -1, 0))
+    nuisance = list(np.moveaxis(calibration_columns(freq, h, differences), -1, 0))
     if is_translation:
-        beside.append(mass_pattern(freq, h, differences))
+        nuisance.append(mass_pattern(freq, h, differences))
     p, q = differences.rows, differences.columns
     own = [
         (q == i)[:, None] * of_dofs[:, p, d].T - (p == i)[:, None] * of_dofs[:, q, d].T
         for i, d in zip(channels, dofs, strict=True)
     ]
-    found = _estimated(h, differences, np.stack([*own, *beside], axis=-1), len(own))
+    found = _estimated(h, differences, np.stack([*own, *nuisance], axis=-1), len(own))
     if found is None:
         return None
     share, error = found
@@ -148,7 +148,7 @@ def found_cross_axis(
 
 
 def _shares(modes: FloatArray, size: FloatArray, n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return channels and the DOFs of their side that they may contain, but for the one that each mostly measures."""
+    """Return channels and DOFs of their side that they may contain, except the one that each mostly measures."""
     moved = abs(modes) * size
     main = moved.argmax(axis=1)
     pairs = [(i, d) for i, own in enumerate(main) for d in range(own // n * n, own // n * n + n) if d != own]
@@ -168,7 +168,7 @@ def _estimated(
         found = fit.solution / fit.size
     solution, size, _, inverse, residual = fit
     inflation = line_correlation(residual.view(np.complex128).reshape(values.shape))
-    # By how much the squares fall with the first k unknowns, if pairs of a line were independent.
+    # Decrease of the squares by the first k unknowns, if pairs of a line were independent.
     fallen = float(solution[:k] @ np.linalg.pinv(inverse[:k, :k], hermitian=True) @ solution[:k])
     mean = float(np.square(residual).mean())
     if not mean > 0 or not special.chdtrc(k, fallen / (mean * inflation)) < _CHANCE:

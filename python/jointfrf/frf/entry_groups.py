@@ -1,4 +1,4 @@
-"""Which entries of a matrix of FRFs are measured twice, are zero, or have their poles in common."""
+"""Entries of a matrix of FRFs that are measured twice, are zero, or have common poles."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["ZERO", "EntryGroup", "connected", "entry_groups", "own_size", "reciprocity_noise"]
 
-#: An FRF below this share of sqrt|h_pp h_qq|, or of the usual size in its row and column, is zero to rounding.
+#: Share of sqrt|h_pp h_qq|, or of the usual size in its row and column, below which an FRF is zero to rounding.
 ZERO = 1e-8
-#: A pair that differs less than this, relatively, was made reciprocal: it holds one measurement.
+#: Relative difference of a pair below which it was made reciprocal: it is one measurement.
 _RECIPROCAL = 1e-9
-#: Rows and columns are scaled in turn so many times, until each has a largest entry near 1.
+#: Number of times that rows and columns are scaled in turn, until each has a largest entry near 1.
 _SCALINGS = 4
 
 
@@ -26,7 +26,7 @@ def own_size(h: ComplexArray) -> FloatArray:
 
 
 def reciprocity_noise(h: ComplexArray) -> FloatArray:
-    """Relative noise level from the differences h_pq - h_qp, robustly.
+    """Return the relative noise level from the differences h_pq - h_qp, robustly.
 
     Parameters
     ----------
@@ -36,12 +36,12 @@ def reciprocity_noise(h: ComplexArray) -> FloatArray:
     Returns
     -------
     ndarray, shape (r,)
-        0 where h is symmetric.
+        Relative noise level; 0 if h is symmetric.
 
     Notes
     -----
     For circular noise of level s, |h_pq - h_qp|^2 / (|h_pq|^2 + |h_qp|^2) is s^2 times an exponential variable, whose
-    median is log 2. A few wrong FRFs do not change a median. FRFs that are zero to rounding are left out.
+    median is log 2. A few wrong FRFs do not change a median. FRFs that are zero to rounding are omitted.
     """
     m = h.shape[-1]
     p, q = np.triu_indices(m, 1)
@@ -60,11 +60,11 @@ class EntryGroup:
     Attributes
     ----------
     rows, columns : ndarray of int, shape (n_entries,)
-        Of entries that count; of a pair that is reciprocal the one above the diagonal.
+        Places of the entries; for a reciprocal pair the place above the diagonal.
     paired : ndarray of bool, shape (n_entries,)
         Whether the entry is one of a reciprocal pair.
     repeated : ndarray of bool, shape (n_entries,)
-        Whether the pair holds two measurements; False where it was made reciprocal before.
+        Whether the pair contains two measurements; False if it was made reciprocal before.
     """
 
     rows: NDArray[np.intp]
@@ -91,17 +91,19 @@ class EntryGroup:
 
 
 def entry_groups(h: ComplexArray, *, reciprocal: bool) -> list[EntryGroup]:
-    """Find the groups; entries that are zero to rounding belong to none.
+    """Return the groups; entries that are zero to rounding belong to none.
 
     Parameters
     ----------
     h : ndarray, shape (n_freq, n_out, n_in)
+        FRFs.
     reciprocal : bool
         Whether entries (p, q) and (q, p) of square matrices are the same FRF.
 
     Returns
     -------
     list of EntryGroup
+        Groups of coupled entries.
     """
     counts = _counting(h)
     n_out, n_in = counts.shape
@@ -129,7 +131,7 @@ def entry_groups(h: ComplexArray, *, reciprocal: bool) -> list[EntryGroup]:
 
 
 def connected(links: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return the number of the set of connected nodes that each is in, by the order of their first nodes.
+    """Return for each node the number of its connected set, in the order of their first nodes.
 
     Parameters
     ----------
@@ -139,6 +141,7 @@ def connected(links: NDArray[np.bool_]) -> NDArray[np.intp]:
     Returns
     -------
     ndarray of int, shape (n,)
+        Number of the set of each node.
 
     Examples
     --------
@@ -158,7 +161,7 @@ def connected(links: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 
 def _counting(h: ComplexArray) -> NDArray[np.bool_]:
-    """Whether an entry is not zero, whatever the units of its row and column."""
+    """Return whether each entry is not zero, for any units of its row and column."""
     size = np.sqrt((h.real**2 + h.imag**2).mean(axis=0))
     for _ in range(_SCALINGS):
         for axis in (0, 1):

@@ -1,4 +1,4 @@
-"""A set of measured FRFs whose rows and columns have names; where its channels are about a joint."""
+"""A set of measured FRFs whose rows and columns have names; places of its channels around a joint."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ _PLURALS = {"receptance": "receptances m/N", "mobility": "mobilities (m/s)/N", "
 #: Names of directions, and of channels.
 _DIRECTION = re.compile(r"([+-]?)(r?[xyz])")
 _CHANNEL = re.compile(r"(\d+)\s*(?::\s*)?([+-]?r?[xyz])")
-#: Names of missing FRFs that a message lists.
+#: Number of missing FRFs that a message names.
 _NAMES_SHOWN = 10
-#: How far above 1 single precision may leave a coherence.
+#: Excess of a coherence over 1 that single precision may cause.
 ROUND_OFF = 1e-5
 ChannelRole = Literal["response", "excitation", "both"]
 JointSide = Literal["j", "k"]
@@ -45,7 +45,7 @@ JointSide = Literal["j", "k"]
 
 @dataclass(frozen=True, order=True)
 class Channel:
-    """A point and a signed direction: where an FRF was measured or excited.
+    """A point and a signed direction of a response or an excitation.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Channel:
 
     @classmethod
     def parse(cls, text: str | Channel) -> Channel:
-        """Channel of a name such as ``102:+y``, ``102:y``, ``102+y``, ``102y`` or ``102:rx``.
+        """Return the channel of a name such as ``102:+y``, ``102:y``, ``102+y``, ``102y`` or ``102:rx``.
 
         Raises
         ------
@@ -89,17 +89,17 @@ class Channel:
         check_type("channel", text, str)
         match = _CHANNEL.fullmatch(text.strip().lower())
         if match is None:
-            raise ValueError(f"{text!r} is no channel: expected a node and a direction such as 102:+y or 102:rx")
+            raise ValueError(f"{text!r} is no channel; write a node and a direction, such as 102:+y or 102:rx")
         return cls(int(match[1]), match[2])
 
     @property
     def sign(self) -> int:
-        """+1 along the axis, -1 against it."""
+        """Sign of the direction: +1 along the axis, -1 against it."""
         return -1 if self.direction[0] == "-" else 1
 
     @property
     def axis(self) -> str:
-        """The direction without its sign."""
+        """Direction without its sign."""
         return self.direction[1:]
 
     @property
@@ -108,7 +108,7 @@ class Channel:
         return self.axis.startswith("r")
 
     def opposite(self) -> Channel:
-        """Return the channel of the same point that points the other way."""
+        """Return the channel of the same point in the opposite direction."""
         return Channel(self.node, ("+" if self.sign < 0 else "-") + self.axis)
 
     def __str__(self) -> str:
@@ -129,22 +129,22 @@ class FrfSet:
     responses, excitations : tuple of Channel
         Names of the rows and columns, each at most once.
     h : ndarray of complex, shape (n_freq, n_responses, n_excitations)
-        The FRFs in SI units, time convention exp(+i w t); NaN where there is none.
+        FRFs in SI units, time convention exp(+i w t); NaN if there is none.
     quantity : {"receptance", "mobility", "accelerance"}
         Displacement (m), velocity (m/s) or acceleration (m/s^2) per force (N); for rotations rad, rad/s, rad/s^2 per
         N m.
     coordinates : mapping of int to ndarray, shape (3,)
-        Global cartesian coordinates of the nodes in m, empty where unknown.
+        Global cartesian coordinates of the nodes in m; nodes without known coordinates are absent.
     source : str
-        Where the set comes from, named in messages.
+        Origin of the set, for messages.
     coherence : ndarray, shape (n_freq, n_responses, n_excitations), optional
-        Ordinary coherence (gamma^2, 0 to 1) of each FRF; NaN where it is not known.
+        Ordinary coherence (gamma^2, 0 to 1) of each FRF; NaN if it is not known.
     averages : number or ndarray, shape (n_responses, n_excitations), optional
-        How many measurements each FRF is the average of; NaN where it is not known.
+        Number of measurements of which each FRF is the average; NaN if it is not known.
     stated : str
         Quantity and unit in the words of the file.
     setups : SetUps, optional
-        Which FRF came from which set-up, of a set that was merged from several.
+        Set-up of each FRF, for a set that was merged from several.
 
     Examples
     --------
@@ -206,11 +206,11 @@ class FrfSet:
 
     @property
     def measured(self) -> NDArray[np.bool_]:
-        """Which FRFs there are, shape (n_responses, n_excitations)."""
+        """Whether each FRF is present, shape (n_responses, n_excitations)."""
         return np.logical_not(np.isnan(self.h).all(axis=0))
 
     def check_whole(self) -> None:
-        """Check that every FRF that is there is finite on all lines.
+        """Check that every FRF that is present is finite on all lines.
 
         Raises
         ------
@@ -219,12 +219,12 @@ class FrfSet:
         """
         measured = self.measured
         if not measured.any():
-            raise ValueError("frfs holds no FRF")
+            raise ValueError("frfs contains no FRF")
         bad = ~np.isfinite(self.h) & measured
         if bad.any():
             line, i, j = (int(places[0]) for places in np.nonzero(bad))
             name = f"{self.responses[i]} / {self.excitations[j]}"
-            raise ValueError(f"FRF {name} holds NaN or Inf, first at {self.freq_hz[line]:g} Hz")
+            raise ValueError(f"FRF {name} contains NaN or Inf, first at {self.freq_hz[line]:g} Hz")
 
     def receptance(self, window_decay: float = 0.0) -> FrfSet:
         """Return the same set as displacement per force.
@@ -232,13 +232,13 @@ class FrfSet:
         Parameters
         ----------
         window_decay : float
-            Decay sigma of an exponential window exp(-sigma t) on the responses, 1/s, default 0. `identify` takes the
+            Decay sigma of an exponential window exp(-sigma t) on the responses, 1/s, default 0. Give `identify` the
             same number.
 
         Returns
         -------
         FrfSet
-            With quantity "receptance" in m/N; the set itself if it is one already.
+            FRFs with quantity "receptance" in m/N; the set itself if it is one already.
 
         Warns
         -----
@@ -272,26 +272,26 @@ class FrfSet:
         return replace(kept, h=kept.h / over, quantity="receptance", setups=setups)
 
     def has(self, output: ChannelLike, input: ChannelLike) -> bool:
-        """Whether the FRF is there, possibly measured along the opposite direction."""
+        """Return whether the FRF is present, possibly measured along the opposite direction."""
         return not self.missing([output], [input])
 
     def missing(self, outputs: Iterable[ChannelLike], inputs: Iterable[ChannelLike]) -> list[tuple[Channel, Channel]]:
-        """Entries of a matrix of FRFs that the set does not hold.
+        """Return the entries of a matrix of FRFs that are not in the set.
 
         Parameters
         ----------
         outputs, inputs : iterable of Channel or str
-            The rows and columns of the matrix.
+            Rows and columns of the matrix.
 
         Returns
         -------
         list of (Channel, Channel)
-            Output and input of every FRF that is not there, row by row; empty if all are.
+            Output and input of every missing FRF, row by row; empty if there is none.
         """
         return self._locate(outputs, inputs)[2]
 
     def measured_between(self, outputs: Sequence[ChannelLike], inputs: Sequence[ChannelLike]) -> NDArray[np.bool_]:
-        """Tell which FRFs between named channels there are, shape (n_outputs, n_inputs)."""
+        """Return which FRFs between named channels are present, shape (n_outputs, n_inputs)."""
         rows, columns = list(map(Channel.parse, outputs)), list(map(Channel.parse, inputs))
         there = np.ones((len(rows), len(columns)), bool)
         for output, input_ in self.missing(rows, columns):
@@ -301,20 +301,20 @@ class FrfSet:
     def matrix(
         self, outputs: Sequence[ChannelLike], inputs: Sequence[ChannelLike], *, allow_missing: bool = False
     ) -> NDArray[np.complex128]:
-        """FRFs between named channels, with their signs.
+        """Return FRFs between named channels, with their signs.
 
         Parameters
         ----------
         outputs, inputs : sequence of Channel or str
-            Rows and columns, for example ``["102:+y", "202:+y"]``. A channel measured the other way serves with the
-            opposite sign.
+            Rows and columns, for example ``["102:+y", "202:+y"]``. A channel measured along the opposite direction is
+            used with the opposite sign.
         allow_missing : bool
-            Whether FRFs that are missing are NaN in the result, instead of an error.
+            Whether missing FRFs are NaN in the result, instead of an error; default False.
 
         Returns
         -------
         ndarray of complex, shape (n_freq, n_outputs, n_inputs)
-            In the unit of the set's quantity, C order, a copy.
+            FRFs in the unit of the set's quantity, C order, a copy.
 
         Raises
         ------
@@ -334,17 +334,17 @@ class FrfSet:
     def coherence_matrix(
         self, outputs: Sequence[ChannelLike], inputs: Sequence[ChannelLike]
     ) -> NDArray[np.float64] | None:
-        """Coherence of the FRFs between named channels, as `identify` and `estimate_noise` take it.
+        """Return the coherence of the FRFs between named channels, for `identify` and `estimate_noise`.
 
         Parameters
         ----------
         outputs, inputs : sequence of Channel or str
-            As for `matrix`.
+            Rows and columns; see `matrix`.
 
         Returns
         -------
         ndarray, shape (n_freq, n_outputs, n_inputs), or None
-            None where the coherence of one of them is not known.
+            Ordinary coherence; None if the coherence of one FRF is not known.
 
         Raises
         ------
@@ -353,23 +353,23 @@ class FrfSet:
         """
         if self.coherence is None:
             return None
-        self.matrix(outputs, inputs)  # all there?
+        self.matrix(outputs, inputs)  # raises an error if FRFs are missing
         places = self._locate(outputs, inputs)[0]
         found = np.ascontiguousarray(self.coherence[:, places[0], places[1]])
         return None if np.isnan(found).any() else found
 
     def least_averages(self, outputs: Sequence[ChannelLike], inputs: Sequence[ChannelLike]) -> float | None:
-        """Smallest number of averages of the FRFs between named channels.
+        """Return the smallest number of averages of the FRFs between named channels.
 
         Parameters
         ----------
         outputs, inputs : sequence of Channel or str
-            As for `matrix`.
+            Rows and columns; see `matrix`.
 
         Returns
         -------
         float or None
-            None where one of them is not known.
+            Number of averages; None if one of them is not known.
         """
         if self.averages is None:
             return None
@@ -378,17 +378,17 @@ class FrfSet:
         return None if np.isnan(least) else least
 
     def setups_between(self, outputs: Sequence[ChannelLike], inputs: Sequence[ChannelLike]) -> SetUps | None:
-        """Set-ups of the FRFs between named channels, as `identify` and `identify_model` take them.
+        """Return the set-ups of the FRFs between named channels, for `identify` and `identify_model`.
 
         Parameters
         ----------
         outputs, inputs : sequence of Channel or str
-            As for `matrix`.
+            Rows and columns; see `matrix`.
 
         Returns
         -------
         SetUps or None
-            None where the set was not merged from several.
+            Set-ups; None if the set was not merged from several.
         """
         if self.setups is None:
             return None
@@ -408,7 +408,7 @@ class FrfSet:
         ValueError
             The band is not an increasing pair of numbers.
         FileContentError
-            No line lies in the band.
+            No line is in the band.
         """
         low, high = as_real("band", band, (2,)).tolist()
         if not low <= high:
@@ -457,7 +457,7 @@ class FrfSet:
         )
 
     def summary(self) -> str:
-        """Describe the set in a few lines."""
+        """Return a description of the set in a few lines."""
         measured = self.measured
         n_missing = measured.size - int(measured.sum())
         nodes = {channel.node for channel in (*self.responses, *self.excitations)}
@@ -492,7 +492,7 @@ class FrfSet:
         return replace(self, freq_hz=self.freq_hz[kept], h=self.h[kept], coherence=coherence, setups=setups)
 
     def _quality(self) -> list[str]:
-        """Describe coherence and averages, as far as known."""
+        """Return a description of coherence and averages, if known."""
         parts = []
         measured = self.measured
         if self.coherence is not None and measured.any():
@@ -506,7 +506,7 @@ class FrfSet:
     def _locate(
         self, outputs: Iterable[ChannelLike], inputs: Iterable[ChannelLike]
     ) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]], NDArray[np.float64], list[tuple[Channel, Channel]]]:
-        """Row, column and sign of every entry of a matrix, and the entries that are not there."""
+        """Return row, column and sign of every entry of a matrix, and the missing entries."""
         for name, named in (("outputs", outputs), ("inputs", inputs)):
             if not isinstance(named, Iterable):
                 raise TypeError(f"{name} must be a sequence of channels, not {type(named).__name__}")
@@ -548,14 +548,14 @@ class FrfSet:
 def _numbers(name: str, values: ArrayLike, kinds: str) -> NDArray[Any]:
     found = as_array(name, values)
     if found.dtype.kind not in kinds:
-        raise TypeError(f"{name} must hold {'numbers' if 'c' in kinds else 'real numbers'}, not {found.dtype}")
+        raise TypeError(f"{name} must contain {'numbers' if 'c' in kinds else 'real numbers'}, not {found.dtype}")
     return found
 
 
 def _checked_coherence(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
     coherence = np.ascontiguousarray(_numbers("coherence", values, "biuf"), dtype=np.float64)
     if coherence.shape != shape:
-        raise ValueError(f"coherence has shape {coherence.shape}, expected that of h, {shape}")
+        raise ValueError(f"coherence has shape {coherence.shape}, h has {shape}; make them equal")
     known = coherence[~np.isnan(coherence)]
     if known.size and not (known.min() >= 0 and known.max() <= 1 + ROUND_OFF):
         raise ValueError(f"coherence must be from 0 to 1, not {known.min():g} to {known.max():g}")
@@ -573,12 +573,12 @@ def _checked_averages(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.f
 
 
 def same_frf(output: Channel, input_: Channel) -> list[tuple[Channel, Channel]]:
-    """List the four pairs of channels that measure the same FRF up to its sign, the exact one first."""
+    """Return the four pairs of channels that measure the same FRF up to its sign, the exact one first."""
     return [(o, i) for o in (output, output.opposite()) for i in (input_, input_.opposite())]
 
 
 def _by_node(channels: Iterable[Channel]) -> str:
-    """Write channels with each node once, as in ``101:+x+y+z 102:+y``."""
+    """Return channels as text with each node once, as in ``101:+x+y+z 102:+y``."""
     directions: dict[int, str] = {}
     for channel in channels:
         directions[channel.node] = directions.get(channel.node, "") + channel.direction
@@ -592,21 +592,21 @@ class ChannelPlace:
     Attributes
     ----------
     channel : Channel
-        Its name in the file of FRFs.
+        Name in the file of FRFs.
     side : {"j", "k"} or None
-        Side of the joint; None where it is not known.
+        Side of the joint; None if it is not known.
     role : {"response", "excitation", "both"}
-        Use of the channel; "both": whatever the file has.
+        Use of the channel; "both": as in the file.
     position : ndarray, shape (3,), or None
-        m; None: that of the file.
+        Position, m; None: the position in the file.
     direction : ndarray, shape (3,), or None
-        Unit vector of the motion or force that the channel of this name stands for; None: that of its name.
+        Unit vector of the motion or force of the channel; None: the direction in its name.
     weight : float
-        In the virtual point, 0 to leave the channel out.
+        Weight in the virtual point, 0 to omit the channel.
     optional : bool
-        Whether the file need not have it: one of three directions of a sensor.
+        Whether the file need not contain it: one of three directions of a sensor.
     where : str
-        Where the entry comes from, for messages.
+        Origin of the entry, for messages.
     """
 
     channel: Channel
@@ -630,31 +630,36 @@ class ChannelPlace:
 
 
 def check_apart(nodes_j: Sequence[int], nodes_k: Sequence[int]) -> None:
-    """Raise if a node is on both sides of a joint."""
+    """Raise an error if a node is on both sides of a joint."""
     shared = set(nodes_j) & set(nodes_k)
     if shared:
         raise ValueError(f"node {min(shared)} is named on both sides of the joint; name it on one")
 
 
 def places_of_nodes(frfs: FrfSet, nodes_j: Sequence[int], nodes_k: Sequence[int]) -> tuple[ChannelPlace, ...]:
-    """List the translational channels of a set at nodes on both sides of a joint.
+    """Return the translational channels of a set at nodes on both sides of a joint.
 
     Parameters
     ----------
     frfs : FrfSet
-        With coordinates of the nodes.
+        FRFs with coordinates of the nodes.
     nodes_j, nodes_k : sequence of int
         Nodes on side j (on A) and on side k (on B).
 
     Returns
     -------
     tuple of ChannelPlace
-        In the order of the nodes; position and direction of the set.
+        Places in the order of the nodes, with position and direction of the set.
 
     Raises
     ------
     ValueError
         A node is on both sides, or the set has no translational channel there.
+
+    See Also
+    --------
+    joint_channels : transform from these channels to joint DOFs.
+    jointfrf.io.read_channel_table : places from a table.
 
     Examples
     --------
@@ -669,7 +674,7 @@ def places_of_nodes(frfs: FrfSet, nodes_j: Sequence[int], nodes_k: Sequence[int]
     check_type("frfs", frfs, FrfSet)
     nodes_j, nodes_k = as_nodes("nodes_j", nodes_j), as_nodes("nodes_k", nodes_k)
     check_apart(nodes_j, nodes_k)
-    # A sensor along +y and a hammer along -y are the same channel: FRFs are found with their signs.
+    # A sensor along +y and a hammer along -y are the same channel: FRFs are returned with their signs.
     known = {(c.node, c.axis): c for c in (*frfs.excitations, *frfs.responses) if not c.is_rotation}
     found = []
     for side, nodes in (("j", nodes_j), ("k", nodes_k)):

@@ -14,46 +14,50 @@ from jointfrf.frf.setups import SetUps
 
 __all__ = ["merge_frfs", "same_lines"]
 
-#: How far lines of the same frequency differ at most, relative to it: files give five to seven digits.
+#: Largest relative difference of lines of the same frequency: files have five to seven digits.
 _SAME_LINES = 1e-5
-#: How far two copies of the same FRF differ at most, relative to its largest value: single precision.
+#: Largest difference of two copies of an FRF, relative to its largest value: single precision.
 _SAME_VALUES = 1e-6
-#: An FRF that was measured again differs by less than this part of it (median over the lines): gains, delays and moved
-#: resonances of set-ups do; another sign, another unit, another FRF do not.
+#: Largest relative difference (median over the lines) of an FRF that was measured again: gains, delays and moved
+#: resonances of set-ups are below; another sign, another unit, another FRF are above.
 _SAME_FRF = 0.3
-#: In metres.
+#: Largest distance of equal positions, m.
 _SAME_PLACE = 1e-6
 
 _Values = NDArray[np.complex128] | NDArray[np.float64]
 
 
 def same_lines(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-    """Whether two sets of frequency lines are the same but for the digits of their files."""
+    """Return whether two sets of frequency lines are equal up to the digits of their files."""
     return one.shape == other.shape and bool(np.allclose(one, other, rtol=_SAME_LINES, atol=0.0))
 
 
 def merge_frfs(sets: Sequence[FrfSet]) -> FrfSet:
-    """Put sets of measured FRFs together.
+    """Return one set made of several sets of measured FRFs.
 
     Parameters
     ----------
     sets : sequence of FrfSet
-        At the same frequency lines. Where quantities differ, all are given as the one that is differentiated most
+        Sets at the same frequency lines. If quantities differ, all are converted to the one that is differentiated most
         often.
 
     Returns
     -------
     FrfSet
-        Channels in the order of the sets. `FrfSet.setups` says which FRF came from which set: of several, an FRF is
-        that of the first, and the others are kept beside it.
+        Merged set, channels in the order of the sets. `FrfSet.setups` states the set of each FRF. If several sets have
+        an FRF, the first one is used, and `setups` keeps the further ones.
 
     Raises
     ------
     FileContentError
-        Sets differ in their frequency lines, grossly in an FRF, in coherence or number of averages of one and the same
-        FRF, or in the coordinates of a node; or all FRFs of one were measured before. Both sources are named.
+        Sets differ in their frequency lines, grossly in an FRF, in its coherence or number of averages, or in the
+        coordinates of a node; or all FRFs of one set were measured before. The message names both sources.
     ValueError
         There is no set.
+
+    See Also
+    --------
+    read_frfs : merged FRFs of several files.
 
     Examples
     --------
@@ -106,7 +110,7 @@ def merge_frfs(sets: Sequence[FrfSet]) -> FrfSet:
 
 
 class _Merged:
-    """Places of the FRFs of several sets in the merged one."""
+    """Places of the FRFs of several sets in the merged set."""
 
     def __init__(self, responses: Sequence[Channel], excitations: Sequence[Channel], sets: Sequence[FrfSet]) -> None:
         self.responses, self.excitations, self.sets = responses, excitations, sets
@@ -116,7 +120,7 @@ class _Merged:
         self.again: dict[tuple[int, int, int], tuple[int, int]] = {}
 
     def setups(self, quantity: str) -> SetUps | None:
-        """Return which FRF came from which set-up, once FRFs are in place; None where all came from one."""
+        """Return the set-up of each FRF, after the FRFs are in place; None if all came from one."""
         names: list[str] = []
         of, found, values = np.full(self.origin.shape, -1), list[tuple[int, int, int]](), list[NDArray[np.complex128]]()
         for number, each in enumerate(self.sets):
@@ -152,7 +156,7 @@ class _Merged:
         )
 
     def fill(self, target: _Values, values_of: Callable[[FrfSet], _Values | None], what: str) -> None:
-        """Copy what each set holds into place; where something is there already, compare the two."""
+        """Copy the values of each set into place; compare them with values that are there already."""
         origin: NDArray[np.intp] = np.full(target.shape[1:], -1)
         for number, each in enumerate(self.sets):
             values = values_of(each)
@@ -164,7 +168,7 @@ class _Merged:
                     if np.isnan(value).all():
                         continue
                     place = self.row_of[response], self.column_of[excitation]
-                    if (*place, number) in self.again:  # what is known of an FRF that is beside the one in place
+                    if (*place, number) in self.again:  # data of a repeated FRF, which is not the one in place
                         continue
                     kept = target[:, *place]
                     if origin[place] < 0:
@@ -183,7 +187,7 @@ class _Merged:
             self._check_own()
 
     def _check_own(self) -> None:
-        """Raise an error for a set of which every FRF was measured before: it is another test, not a set-up of one."""
+        """Raise an error for a set of which every FRF was measured before: it is another test, not a set-up."""
         for row, column, number in self.again:
             if not (self.origin == number).any():
                 one, two = _name(self.sets[self.origin[row, column]], self.sets), _name(self.sets[number], self.sets)
@@ -194,13 +198,13 @@ class _Merged:
 
 
 def _is_copy(kept: _Values, value: _Values) -> bool:
-    """Whether two are the same but for the digits of their files."""
+    """Return whether two values are equal up to the digits of their files."""
     scale = np.nanmax(abs(kept)) if np.isfinite(kept).any() else 0.0
     return np.allclose(kept, value, rtol=0.0, atol=_SAME_VALUES * float(scale), equal_nan=True)
 
 
 def _is_measured_again(kept: _Values, value: _Values) -> bool:
-    """Whether two FRFs may be one FRF measured twice."""
+    """Return whether two FRFs may be one FRF measured twice."""
     if _is_copy(kept, value) or not (np.isfinite(kept).all() and np.isfinite(value).all()):
         return False
     size = np.maximum(abs(kept), abs(value))
@@ -208,16 +212,16 @@ def _is_measured_again(kept: _Values, value: _Values) -> bool:
 
 
 def _as_quantity(frfs: FrfSet, quantity: str, values: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """FRFs of a set, frequency first, differentiated in time as often as needed."""
+    """Return FRFs of a set, frequency first, differentiated in time as often as needed."""
     power = POWER_OF_I_OMEGA[quantity] - POWER_OF_I_OMEGA[frfs.quantity]
-    if power <= 0:  # negative for a set that holds no FRF
+    if power <= 0:  # negative for a set without an FRF
         return values
     i_omega = 2j * np.pi * frfs.freq_hz.reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray(values * i_omega**power)
 
 
 def _coordinates(sets: Sequence[FrfSet]) -> dict[int, NDArray[np.float64]]:
-    """Coordinates of all nodes, which must be the same wherever they are given."""
+    """Return coordinates of all nodes, which must be equal in all sets."""
     found: dict[int, NDArray[np.float64]] = {}
     origin: dict[int, FrfSet] = {}
     for each in sets:

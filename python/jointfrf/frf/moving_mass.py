@@ -1,6 +1,6 @@
-"""Mass of a sensor or an impedance head that moves from point to point: found from reciprocity, and taken off.
+"""Mass of a sensor or an impedance head that moves from point to point: estimated from reciprocity, and removed.
 
-If the sensor of mass m stands at point p, the receptance measured is h'_pq = h_pq / (1 - w^2 m h_pp), with h of the
+If the sensor of mass m is at point p, the measured receptance is h'_pq = h_pq / (1 - w^2 m h_pp), with h of the
 structure alone, so that h_pq = h'_pq / (1 + w^2 m h'_pp) (mass cancellation [1]_). From h_pq = h_qp,
 
     h'_pq - h'_qp  =  m w^2 (h'_qp h'_pp - h'_pq h'_qq) + noise
@@ -35,14 +35,14 @@ __all__ = [
     "steps_without_a_line",
 ]
 
-#: A mass is taken for one from this many standard errors on: other errors of the FRFs resemble a small one. A first
-#: look without gains of channels goes on from fewer.
+#: Least mass in standard errors: other errors of the FRFs resemble a small mass. A first estimate without gains of
+#: channels needs fewer.
 _SIGNIFICANT, _LOOK = 8.0, 3.0
 #: The lightest accelerometers weigh 0.2 g: less is no sensor, kg.
 _LIGHTEST = 1e-4
-#: Turns of the weights, which follow from the differences without the mass, and lines at least.
+#: Number of updates of the weights, which follow from the differences without the mass, and least number of lines.
 _TURNS, _LEAST_LINES = 3, 50
-#: A residual counts no more than this many standard deviations.
+#: Number of standard deviations at which a residual is clipped.
 _CUT = 3.0
 
 
@@ -53,9 +53,9 @@ class MovingMass:
     Attributes
     ----------
     mass : float
-        kg.
+        Mass, kg.
     std_error : float
-        kg; 0 if the mass was given.
+        Standard error, kg; 0 if the mass was given.
     shown : float, optional
         Mass that the FRFs show, kg, if they contradict a mass that was given.
     """
@@ -70,7 +70,7 @@ class MovingMass:
         return self.mass < 0
 
     def factor(self, freq_hz: FloatArray, h: ComplexArray) -> ComplexArray:
-        """Return 1 + w^2 m h_pp of each point, shape (n_freq, m), by receptances as measured."""
+        """Return 1 + w^2 m h_pp of each point, shape (n_freq, m), from measured receptances."""
         return np.asarray(1 + (2 * np.pi * freq_hz[:, None]) ** 2 * abs(self.mass) * np.einsum("lpp->lp", h))
 
     def removed(self, freq_hz: FloatArray, h: ComplexArray) -> ComplexArray:
@@ -93,12 +93,12 @@ def given_mass(freq_hz: FloatArray, h: ComplexArray, mass: float) -> MovingMass:
 
 
 def found_mass(freq_hz: FloatArray, h: ComplexArray) -> MovingMass | None:
-    """Return the mass that moves from point to point, by h_pq - h_qp; None if they show none.
+    """Return the mass that moves from point to point, from h_pq - h_qp; None if these show none.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     h : ndarray, shape (n_freq, m, m)
         Receptances, m/N, responses and forces at the same points, as translations.
 
@@ -135,7 +135,7 @@ def mass_pattern(freq: FloatArray, h: ComplexArray, differences: ReciprocityDiff
 def _fitted(
     freq: FloatArray, h: ComplexArray, differences: ReciprocityDifferences, pattern: ComplexArray
 ) -> MovingMass | None:
-    """Return the mass by least squares, if it is one."""
+    """Return the mass by least squares, if it is significant."""
     near, values, mass = near_squares(h), differences.values, 0.0
     design: ComplexArray = np.concatenate([pattern[..., None], calibration_columns(freq, h, differences)], axis=-1)
     equations, usual = real_equations(design, values), medians(near.T).T
@@ -166,12 +166,12 @@ def real_equations(design: ComplexArray, values: ComplexArray) -> tuple[FloatArr
 
 
 class HuberFit(NamedTuple):
-    """Huber's estimate of weighted real equations, and what its covariance takes.
+    """Huber's estimate of weighted real equations, and the terms of its covariance.
 
     Attributes
     ----------
     solution : ndarray, shape (k,)
-        In units of 1 / size.
+        Solution in units of 1 / size.
     size : ndarray, shape (k,)
         Norms of the weighted columns.
     columns : ndarray, shape (n, 2, k)
@@ -179,7 +179,7 @@ class HuberFit(NamedTuple):
     inverse : ndarray, shape (k, k)
         Inverse of their normal equations.
     residual : ndarray, shape (n, 2)
-        Weighted residual, cut at `_CUT` standard deviations.
+        Weighted residual, clipped at `_CUT` standard deviations.
     """
 
     solution: FloatArray

@@ -1,4 +1,4 @@
-"""Pollution of FRFs: every kind of noise the thesis uses, and a physical default."""
+"""Pollution of FRFs: every kind of noise of the thesis, and a physical default."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = [
 
 NoiseKind = Literal["complex", "complex-per-part", "real-normal", "real-uniform", "real-uniform-std"]
 NoiseReference = Literal["entry", "line", "spectrum"]
-#: Realisations are counted in 31 bits.
+#: Number of realisations, which have 31 bits.
 MOST_REALISATIONS: Final = 2**31 - 1
 
 
@@ -33,7 +33,7 @@ class NoiseNumbers(NamedTuple):
     Attributes
     ----------
     letter : str
-        By which the kernel knows the kind.
+        Letter of the kind in the kernel.
     power : float
         Mean square modulus at level 1.
     is_circular : bool
@@ -45,7 +45,7 @@ class NoiseNumbers(NamedTuple):
     is_circular: bool
 
 
-#: The kinds of noise. A new kind: its word above, its line here, a letter in `noise.f90` of the kernel.
+#: The kinds of noise. For a new kind, add its word above, its line here, and a letter in `noise.f90` of the kernel.
 NOISE_KINDS: Final[dict[NoiseKind, NoiseNumbers]] = {
     "complex": NoiseNumbers("C", 1.0, True),
     "complex-per-part": NoiseNumbers("P", 2.0, True),
@@ -67,7 +67,7 @@ def pollute(
     realisation: int = 0,
     rng: int | np.random.Generator | None = None,
 ) -> ComplexArray:
-    """Add measurement noise to FRFs.
+    """Return FRFs with added measurement noise.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def pollute(
     kind : str
         Distribution of the noise number of an entry and a line:
 
-        - "complex": circular complex normal, E|e|^2 = level^2. What averaged measurements show; the default.
+        - "complex": circular complex normal, E|e|^2 = level^2, as in averaged measurements; the default.
         - "complex-per-part": circular complex normal, standard deviation `level` on each of Re and Im.
         - "real-normal": real normal, standard deviation `level`.
         - "real-uniform": real, uniform between -level and level.
@@ -87,22 +87,25 @@ def pollute(
     seed : int
         Seed, 0 to 2**64 - 1; the same seed gives the same noise on any machine and any number of threads.
     relative_to : {"entry", "line", "spectrum"}
-        What the level refers to: the entry itself, H (1 + e) (a real kind then leaves all phases exact: the wording of
-        section 3.2); the largest modulus at that line, H + e max|H| (the wording of section 3.1); or the largest over
-        the whole spectrum.
+        Reference of the level, default "entry":
+
+        - "entry": the entry itself, H (1 + e), as in section 3.2; a real kind then leaves all phases exact
+        - "line": the largest modulus at that line, H + e max|H|, as in section 3.1
+        - "spectrum": the largest modulus over the whole spectrum
     reciprocal : bool
-        Whether entry (p, q) and entry (q, p) get the same noise.
+        Whether entry (p, q) and entry (q, p) get the same noise, default False.
     block : int, optional
         Size of square blocks whose entries share one noise number, for noise common to the FRFs of a pair of points.
     realisation : int
-        Number of an independent repetition with this seed.
+        Number of an independent repetition with this seed, default 0.
     rng : int or numpy.random.Generator, optional
-        In the place of `seed`, as in other scientific packages (SPEC 7): a seed, or a generator from which one is
-        drawn, so that each call has noise of its own. None is no random seed: noise is then that of `seed`.
+        Random generator in place of `seed`, as in other scientific packages (SPEC 7): a seed, or a generator that draws
+        one, so that the noise of each call is different. None is no random seed: `seed` then determines the noise.
 
     Returns
     -------
     ndarray, shape (n_freq, n_out, n_in)
+        Polluted FRFs.
 
     Raises
     ------
@@ -110,12 +113,17 @@ def pollute(
         An unknown word, a negative level, blocks that do not fit, reciprocal noise on a matrix that is not square, a
         seed or a realisation out of range; both `seed` and `rng`.
     TypeError
-        `rng` is neither a whole number nor a generator.
+        `rng` is not a whole number or a generator.
+
+    See Also
+    --------
+    realisations : several repetitions at once.
+    estimate_noise : noise of measured FRFs.
 
     Notes
     -----
-    Numbers come from a counter-based generator (Threefry-2x64-20): the counter is made of entry, line and realisation,
-    the key of the seed. So the number of an entry depends on nothing else. Normal numbers are those of Box and Muller.
+    Numbers come from a counter-based generator (Threefry-2x64-20). The counter is made of entry, line and realisation,
+    the key of the seed, so that the number of an entry depends on nothing else. Normal numbers follow Box and Muller.
 
     References
     ----------
@@ -161,23 +169,29 @@ def realisations(
     count: int = 1,
     rng: int | np.random.Generator | None = None,
 ) -> ComplexArray:
-    """Several repetitions of `pollute`, numbers `first` to `first + count - 1`.
+    """Return several repetitions of `pollute`, numbers `first` to `first + count - 1`.
 
     Parameters
     ----------
     h, level, kind, seed, relative_to, reciprocal, block, rng
-        As in `pollute`.
+        Exact FRFs and options of the noise; see `pollute`.
     first, count : int
-        Number of the first repetition, and how many.
+        Number of the first repetition, and number of repetitions.
 
     Returns
     -------
     ndarray, shape (count, n_freq, n_out, n_in)
+        Polluted FRFs.
 
     Raises
     ------
     ValueError, TypeError
-        As in `pollute`.
+        An error of `pollute`.
+
+    See Also
+    --------
+    pollute : one repetition.
+    identify_realisations : fit of each repetition.
 
     Examples
     --------
@@ -214,7 +228,7 @@ def noise_arguments(
     count: int,
     shape: tuple[int, ...],
 ) -> tuple[str, str, int, int, float, NDArray[np.int32]]:
-    """Check the arguments of noise for matrices of `shape`, and return them as the kernel takes them."""
+    """Check the arguments of noise for matrices of `shape`, and return them as arguments of the kernel."""
     check_choice("kind", kind, tuple(NOISE_KINDS))
     check_choice("relative_to", relative_to, get_args(NoiseReference))
     number = as_number("level", level)
@@ -234,7 +248,7 @@ def noise_arguments(
 
 
 def _whole_seed(seed: int, rng: int | np.random.Generator | None) -> int:
-    """Return the seed, or that which `rng` is or gives."""
+    """Return the seed, or the seed that `rng` is or draws."""
     number, name = as_integer("seed", seed), "seed"
     if rng is not None:
         if number != 0:

@@ -34,25 +34,25 @@ from jointfrf.kernel.call import call_for_number
 
 __all__ = ["NoiseModel", "acceleration_floor", "describes_better", "estimate_noise", "found_noise"]
 
-#: What the variance was found from.
+#: Source of the variance.
 NoiseSource = Literal["residual", "reciprocity", "none"]
 
-#: Smooth FRFs and noise model are found in turn so often at most, until variances change by less than a factor on
-#: nearly all lines: weights that are wrong by 1.5 on half of the lines cost 4 % of the efficiency.
+#: Maximum number of updates of smooth FRFs and noise model in turn, and the factor of the variances on nearly all lines
+#: below which they end: weights that are wrong by 1.5 on half of the lines cost 4 % of the efficiency.
 _MOST_TURNS = 4
 _SETTLED = 1.5
 _SETTLED_SHARE = 0.97
-#: Differences that are so many times smaller than measured minus smooth do not contain the noise of driving points.
+#: Ratio of measured minus smooth to differences above which differences do not contain the noise of driving points.
 _UNSEEN = 3.0
-#: Smooth FRFs that miss the measured ones by so many times the noise that differences show are refused.
+#: Ratio of the residual of smooth FRFs to the noise of differences above which smooth FRFs are rejected.
 _MISSED = 2.0
-#: Of fewer lines the parts of the noise by entry are hardly known, and smooth FRFs are no nearer than measured ones.
+#: Number of lines below which the noise by entry is hardly known, and smooth FRFs are no better than measured ones.
 _COARSE = 50
-#: Odds of 20 to 1.
+#: Difference of -2 log likelihood: odds of 20 to 1.
 _CLEARLY = 6.0
-#: Below this share of the median line a floor of acceleration does not grow any more, as sensors end there.
+#: Share of the median line below which a floor of acceleration is constant, because sensors end there.
 _LOWEST = 1e-3
-#: FRFs are not reciprocal if differences that are smooth over frequency are larger, relative to the FRFs.
+#: Relative size of differences that are smooth over frequency above which FRFs are not reciprocal.
 _UNSYMMETRIC = 0.5
 #: Least relative noise for weights: systematic errors of measured FRFs are larger.
 _ROUNDING = 1e-4
@@ -74,26 +74,35 @@ class NoiseModel:
     floor : ndarray, shape (n_out, n_in)
         Part that does not depend on |h|, at the median line, in the unit of the FRF.
     coherence_factor : ndarray, shape (n_out, n_in)
-        Noise over that by the coherence; 0 without coherence. Near 1 where it explains the noise alone.
+        Ratio of the noise to the noise by coherence; 0 without coherence. Near 1 if coherence explains the noise alone.
     variance : ndarray, shape (n_freq, n_out, n_in)
-        E|e|^2.
+        Noise variance E|e|^2, squared unit of the FRF.
     inflation : float
-        How many neighbouring lines carry the noise of one independent line: covariances of estimates take this factor.
+        Number of neighbouring lines that carry the noise of one independent line: covariances of estimates take this
+        factor.
     inflation_source : {"reciprocity", "residual", "none"}
-        Differences h_pq - h_qp, in which no model enters; or measured minus smooth, corrected for the parameters, where
-        FRFs are not square or were made reciprocal before; or nothing, too few lines.
+        Source of the inflation:
+
+        - "reciprocity": differences h_pq - h_qp, which do not depend on a model
+        - "residual": measured minus smooth, corrected for the parameters, if FRFs are not square or were made
+          reciprocal before
+        - "none": too few lines
     line_level : ndarray, shape (n_freq,)
-        Variation of the noise power over frequency, common to all entries, that the parts do not describe; 1 where it
-        is not significant.
+        Variation of the noise power over frequency, common to all entries, that the parts do not describe; 1 if it is
+        not significant.
     line_factor : ndarray, shape (n_freq,)
-        By how much the noise power of an outlying line (mains hum) exceeds the model, 1 for other lines.
+        Ratio of the noise power of an outlying line (mains hum) to the model, 1 for other lines.
     source : {"residual", "reciprocity", "none"}
-        What the variance comes from: measured minus smooth FRFs; the differences h_pq - h_qp, with too few lines or
-        too little noise for smoothing; none, where neither shows noise: the variance is then 0.
+        Source of the variance:
+
+        - "residual": measured minus smooth FRFs
+        - "reciprocity": the differences h_pq - h_qp, with too few lines or too little noise for smoothing
+        - "none": both show no noise, and the variance is 0
     smooth : SmoothFrfs
+        Smooth FRFs.
     calibration : CalibrationErrors or None
-        Errors that are smooth over frequency, where h_pq and h_qp differ by more than noise: they are in neither
-        variance nor inflation.
+        Errors that are smooth over frequency, if h_pq and h_qp differ by more than noise. Variance and inflation do not
+        contain them.
     floor_of_acceleration : bool
         Whether the floor is constant in acceleration.
     """
@@ -143,48 +152,59 @@ def estimate_noise(
     max_poles: int = 60,
     like: NoiseModel | None = None,
 ) -> NoiseModel:
-    """Estimate the noise of measured FRFs, and smooth them.
+    """Return the noise of measured FRFs, with smooth FRFs.
 
     Parameters
     ----------
     freq_hz : array_like, shape (n_freq,)
         Lines in Hz, all different, in any spacing.
     h : array_like, shape (n_freq, n_out, n_in)
-        Measured FRFs.
+        Measured FRFs, in any unit.
     reciprocal : bool, optional
         Whether h_pq and h_qp of a square matrix are the same FRF, because responses and forces are the same points in
         the same order. By default the FRFs decide.
     coherence : array_like, shape (n_freq, n_out, n_in), optional
         Ordinary coherence of each FRF, above 0, at most 1.
     averages : float, optional
-        Number of averages behind the coherence; 1 if it is not given, `coherence_factor` then holds 1/sqrt(averages).
+        Number of averages behind the coherence, default 1; without it, `coherence_factor` contains 1/sqrt(averages).
     max_poles : int
-        As in `smooth_frfs`.
+        Largest number of poles; see `smooth_frfs`.
     like : NoiseModel, optional
-        Of other FRFs of the same structure on the same lines, such as another realisation: its poles and variances are
-        the first ones, which saves most of the search. It is not used where it does not describe these FRFs.
+        Noise of other FRFs of the same structure on the same lines, such as another realisation. Its poles and
+        variances are initial values, which saves most of the search. It is ignored if it does not describe these FRFs.
 
     Returns
     -------
     NoiseModel
+        Parts of the noise, its correlation, outlying lines, and smooth FRFs.
 
     Raises
     ------
     ValueError
-        As `smooth_frfs`. Or coherence is out of range, averages have no coherence or are below 1; or a square matrix is
-        not reciprocal although `reciprocal` is true, or has too few lines to estimate its noise otherwise.
+        An error of `smooth_frfs`. Or coherence is out of range, averages have no coherence or are below 1; or a square
+        matrix is not reciprocal although `reciprocal` is true, or has too few lines to estimate its noise otherwise.
+
+    See Also
+    --------
+    smooth_frfs : smooth FRFs for known noise.
+    identify : fit of a joint, which estimates the noise by default.
+    pollute : FRFs with added noise.
 
     Notes
     -----
-    Smooth FRFs and noise model are found in turn until the variances settle. Squares of measured minus smooth, divided
-    by the part of the noise that the smooth FRFs have not taken up, give the parts of the variance by entry. From
-    coherence g^2 of n averages, v = (1 - g^2)/(n g^2) |h|^2 is E|e|^2; |h| alone has half of it as its variance. v
-    enters as one more part with a factor of its own, so the residual, which sees all noise, decides how far the
-    coherence is believed. Where h_pq and h_qp differ smoothly over frequency, by gains, delays and drifts of channels,
-    these differences are taken off first: they are `calibration`, not noise. If the rest of the differences is smooth
-    over frequency as well, and exceeds the noise that rational functions leave, `reciprocal` is false. More than 8192
-    lines are cut into pieces of equal length, each with parts of its own; `variance` is by these, `relative`, `floor`
-    and `coherence_factor` are their root mean squares.
+    Smooth FRFs and noise model are updated in turn until the variances converge. Squares of measured minus smooth FRFs
+    are divided by the part of the noise that the smooth FRFs have not absorbed. They give the parts of the variance by
+    entry.
+
+    From coherence g^2 of n averages, v = (1 - g^2)/(n g^2) |h|^2 is E|e|^2; |h| alone has half of it as its variance. v
+    is one more part with a separate factor. The residual, which contains all noise, thus determines the weight of the
+    coherence.
+
+    If h_pq and h_qp differ smoothly over frequency, by gains, delays and drifts of channels, these differences are
+    first removed: they are `calibration`, not noise. If the rest of the differences is smooth over frequency as well,
+    and exceeds the noise that rational functions leave, `reciprocal` is false. More than 8192 lines are cut into pieces
+    of equal length with separate parts. `variance` follows from these; `relative`, `floor` and `coherence_factor` are
+    their root mean squares.
 
     Examples
     --------
@@ -266,7 +286,7 @@ def found_noise(
         if calibration is not None:
             noisy = replace(noisy, h=calibration.without(freq, lines))
         model = replace(estimated(noisy, slice(None)), calibration=calibration)
-        # What was measured is the caller's.
+        # The arrays of the measurement belong to the caller.
         return (
             model if model.smooth.is_smooth else replace(model, smooth=replace(model.smooth, h=model.smooth.h.copy()))
         )
@@ -315,14 +335,18 @@ def _joined(places: list[NDArray[np.intp]], parts: Iterable[NoiseModel], shape: 
 
 @dataclass(frozen=True)
 class _NoisyLines:
-    """Checked FRFs whose noise is sought, lines in rising order.
+    """Checked FRFs whose noise is estimated, lines in rising order.
 
     Attributes
     ----------
     freq : ndarray, shape (n_freq,)
+        Frequencies, Hz.
     h : ndarray, shape (n_freq, n_out, n_in)
+        Measured FRFs.
     reciprocal : bool
+        Whether h_pq and h_qp are the same FRF.
     max_poles : int
+        Largest number of poles.
     """
 
     freq: FloatArray
@@ -337,7 +361,7 @@ class _NoisyLines:
 
     @cached_property
     def differences(self) -> ReciprocityDifferences | None:
-        """Differences of reciprocal entries, where there are any."""
+        """Differences of reciprocal entries, if there are any."""
         return reciprocity_differences(self.h, self.groups) if self.reciprocal else None
 
     @cached_property
@@ -359,13 +383,13 @@ class _NoisyLines:
     def smoothed(
         self, variance: FloatArray, inflation: float | None, patience: int, start: tuple[ComplexArray, ...] = ()
     ) -> SmoothFrfs:
-        """Return smooth FRFs by weights of this variance; the search begins with the poles `start`, rad/s."""
+        """Return smooth FRFs by weights of this variance; the search starts with the poles `start`, rad/s."""
         return smoothed(
             self.freq, self.h, variance, OrderSearch(inflation, self.max_poles, patience), self.groups, start
         )
 
     def weighing(self, variance: FloatArray) -> FloatArray:
-        """Return the variance for weights: not below rounding, where differences of most lines are zero."""
+        """Return the variance for weights: not below rounding, even if differences of most lines are zero."""
         return np.maximum(variance, self._least)
 
     @cached_property
@@ -376,17 +400,17 @@ class _NoisyLines:
 def _estimated(
     lines: _NoisyLines, given: FloatArray | None, near: FloatArray | None, like: NoiseModel | None
 ) -> NoiseModel:
-    """Noise model of checked FRFs; `near` is the variance of others on these lines."""
+    """Return the noise model of checked FRFs; `near` is the variance of others on these lines."""
     differences = lines.differences
-    begun = None if like is None or near is None else _begun_like(lines, near, like)
+    begun = None if like is None or near is None else _initial_like(lines, near, like)
     if begun is None:
-        differences, smooth, variance, inflation = _begun(lines, differences)
+        differences, smooth, variance, inflation = _initial(lines, differences)
     else:
         smooth, variance, inflation = begun
     if not smooth.is_smooth:
         return _without_smoothing(lines, smooth, differences)
     if begun is None:
-        model = _settled(lines, smooth, variance, inflation, given, differences)
+        model = _converged(lines, smooth, variance, inflation, given, differences)
     else:
         model = _model(lines.h, smooth, given, inflation or 1.0, differences, robust=False)
     smooth = model.smooth
@@ -397,7 +421,7 @@ def _estimated(
     return replace(model, inflation=inflation, inflation_source=source)
 
 
-def _settled(
+def _converged(
     lines: _NoisyLines,
     smooth: SmoothFrfs,
     variance: FloatArray,
@@ -405,7 +429,7 @@ def _settled(
     given: FloatArray | None,
     differences: ReciprocityDifferences | None,
 ) -> NoiseModel:
-    """Return the noise model when smooth FRFs and variances, found in turn, have settled."""
+    """Return the noise model after convergence of smooth FRFs and variances in turn."""
     for _ in range(_MOST_TURNS):
         model = _model(lines.h, smooth, given, inflation or 1.0, differences, robust=True)
         inflation, _ = _found_inflation(lines.h, differences, model)
@@ -415,7 +439,7 @@ def _settled(
         settled = bool((steps < np.log(_SETTLED)).mean() > _SETTLED_SHARE)
         known = None if differences is None else inflation
         after = lines.smoothed(variance, known, 0 if settled else _patience(differences), smooth.poles)
-        # Strong correlation of lines makes poles expensive: without one that is needed, the residual is no noise.
+        # Strong correlation of lines makes poles expensive: if one of them is missing, the residual is no noise.
         if after.level > max(_UNSEEN, smooth.level):
             break
         smooth = after
@@ -425,10 +449,10 @@ def _settled(
 
 
 def _level_of_differences(lines: _NoisyLines, model: NoiseModel, differences: ReciprocityDifferences) -> float | None:
-    """Return the relative noise that differences show, where it describes the noise better than measured minus smooth.
+    """Return the relative noise that differences show, if it describes the noise better than measured minus smooth.
 
-    Of few and coarse lines, which rational functions miss by as much as their noise or more: where what is left is far
-    more than differences show, and where the noise is of one relative level. Of many lines, noise that h_pq and h_qp
+    It does for few and coarse lines, which rational functions miss by as much as their noise or more: if the residual
+    is far more than the differences, and the noise has one relative level. For many lines, noise that h_pq and h_qp
     share is more likely. Differences of rounding show no noise.
     """
     if len(lines.h) >= _COARSE:
@@ -442,23 +466,23 @@ def _level_of_differences(lines: _NoisyLines, model: NoiseModel, differences: Re
     return level if level > 0 else None
 
 
-def _begun(
+def _initial(
     lines: _NoisyLines, differences: ReciprocityDifferences | None
 ) -> tuple[ReciprocityDifferences | None, SmoothFrfs, FloatArray, float | None]:
-    """Return first smooth FRFs, their variance and inflation, and the differences if these see the noise."""
+    """Return first smooth FRFs, their variance and inflation, and the differences if these show the noise."""
     smooth, variance, inflation = _first_smooth(lines, differences)
     if differences is not None and smooth.is_smooth and smooth.level > _UNSEEN:
         other = _first_smooth(lines, None)
-        # Where no rational function fits, nothing is gained by leaving the differences.
+        # If no rational function fits, nothing is gained by omitting the differences.
         if np.median((abs(lines.h - other[0].h) ** 2 / variance)[:, (other[0].h != 0).any(axis=0)]) < _UNSEEN:
             return None, *other
     return differences, smooth, variance, inflation
 
 
-def _begun_like(
+def _initial_like(
     lines: _NoisyLines, near: FloatArray, like: NoiseModel
 ) -> tuple[SmoothFrfs, FloatArray, float | None] | None:
-    """Return smooth FRFs with the poles of others, relocated; None where these leave more than noise like theirs."""
+    """Return smooth FRFs with relocated poles of others; None if these leave more noise."""
     if not like.smooth.is_smooth:
         return None
     variance = lines.weighing(near)
@@ -469,7 +493,7 @@ def _begun_like(
 def _first_smooth(
     lines: _NoisyLines, differences: ReciprocityDifferences | None
 ) -> tuple[SmoothFrfs, FloatArray, float | None]:
-    """Return smooth FRFs by weights from differences where there are any, these variances, and the inflation."""
+    """Return smooth FRFs by weights from differences if there are any, these variances, and the inflation."""
     inflation = None
     if differences is None:
         variance = first_variance(lines.near, lines.usual)
@@ -486,7 +510,7 @@ def _patience(differences: ReciprocityDifferences | None) -> int:
 
 
 def _coherence_variance(h: ComplexArray, coherence: ArrayLike | None, averages: float | None) -> FloatArray | None:
-    """E|e|^2 by the coherence."""
+    """Return E|e|^2 by the coherence."""
     if coherence is None:
         if averages is not None:
             raise ValueError("averages need coherence; give coherence, too")
@@ -522,10 +546,10 @@ def _model(
     *,
     robust: bool,
 ) -> NoiseModel:
-    """Noise model from measured minus smooth.
+    """Return the noise model from measured minus smooth FRFs.
 
-    The robust one is for weights: the error of smooth FRFs that are not the last, at peaks and antiresonances, must not
-    be taken for noise, nor for outlying lines where differences show these.
+    The robust one is for weights. It must not take the error of preliminary smooth FRFs at peaks and antiresonances for
+    noise, or for outlying lines if differences show these.
     """
     n_freq, n_out, n_in = h.shape
     shown = (smooth.h != 0).any(axis=0)
@@ -563,14 +587,14 @@ def _numbers(shown: NDArray[np.bool_], differences: ReciprocityDifferences | Non
 
 
 def describes_better(loss: float, other: float) -> bool:
-    """Whether -2 log likelihood of another floor is clearly lower."""
+    """Return whether -2 log likelihood of another floor is clearly lower."""
     return loss < other - _CLEARLY
 
 
 def _without_smoothing(
     lines: _NoisyLines, smooth: SmoothFrfs, differences: ReciprocityDifferences | None, level: float = 0.0
 ) -> NoiseModel:
-    """Relative noise alike for all entries, for few lines and for nearly exact FRFs."""
+    """Return relative noise equal for all entries, for few lines and for nearly exact FRFs."""
     h = lines.h
     n_freq, n_out, n_in = h.shape
     source = "reciprocity" if level > 0 else "none"

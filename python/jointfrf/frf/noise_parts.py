@@ -21,33 +21,34 @@ __all__ = [
     "reciprocity_differences",
 ]
 
-#: Both directions of a pair have noise of other size beyond so many standard deviations.
+#: Number of standard deviations beyond which both directions of a pair have different noise.
 _APART = 4.0
 
 
 def noise_parts(squares: FloatArray, terms: FloatArray, *, robust: bool = False, common: bool = False) -> FloatArray:
-    """Non-negative parts of the variance, by maximum likelihood for exponentially distributed squares.
+    """Return non-negative parts of the variance, by maximum likelihood for exponentially distributed squares.
 
     Parameters
     ----------
     squares : ndarray, shape (n_entries, n_freq)
-        |e|^2, corrected for what smoothing has taken up.
+        Squares |e|^2, corrected for the part that smoothing has absorbed.
     terms : ndarray, shape (n_terms, n_entries, n_freq)
-        E|e|^2 = sum over the terms of part times term. The first is |h|^2, which lines are binned by.
+        Terms of E|e|^2 = sum over the terms of part times term. The first is |h|^2, by which lines are binned.
     robust : bool
-        Whether medians of the bins count, which some lines with another error than noise do not change; as exact as
-        the squares are exponentially distributed.
+        Whether to use medians of the bins, which a few lines with another error than noise do not change; they are as
+        exact as the squares are exponentially distributed. Default False.
     common : bool
-        Whether the second of two parts is the same in all entries, unless the squares clearly show that it differs:
-        few lines of an entry may show it. Entries that do not clearly show one have none.
+        Whether the second of two parts is equal in all entries, unless the squares clearly show that it differs,
+        because few lines of an entry may show it; default False. Entries that do not clearly show one have none.
 
     Returns
     -------
     ndarray, shape (n_terms, n_entries)
+        Parts of the variance.
 
     Notes
     -----
-    The estimate holds for any distribution of e with this variance; it is efficient for circular normal e.
+    The estimate is valid for any distribution of e with this variance; it is efficient for circular normal e.
     """
     parts = np.empty(terms.shape[:2])
     method = "C" if common else "R" if robust else "L"
@@ -63,9 +64,9 @@ class LineLevels:
     Attributes
     ----------
     usual : ndarray, shape (n_freq,)
-        Slow variation over frequency; 1 where there is none that is significant.
+        Slow variation over frequency; 1 if it is not significant.
     factor : ndarray, shape (n_freq,)
-        By how much an outlying line exceeds the lines around; 1 for other lines.
+        Ratio of an outlying line to the lines around it; 1 for other lines.
     """
 
     usual: FloatArray
@@ -73,20 +74,21 @@ class LineLevels:
 
 
 def line_levels(noise: ComplexArray, inflation: float = 1.0, *, is_residual: bool = True) -> LineLevels:
-    """Find slow variation of the noise over frequency, and outlying lines.
+    """Return slow variation of the noise over frequency, and outlying lines.
 
     Parameters
     ----------
     noise : ndarray, shape (n_entries, n_freq)
         Noise of unit variance.
     inflation : float
-        Lines that carry the noise of one independent line.
+        Number of lines that carry the noise of one independent line, default 1.
     is_residual : bool
-        Whether the noise is measured minus smooth, in which modes that are missed show, too.
+        Whether the noise is measured minus smooth FRFs, which also shows missing modes; default True.
 
     Returns
     -------
     LineLevels
+        Levels of all lines.
     """
     usual, factor = np.empty((2, noise.shape[1]))
     call("line_levels", (*noise.shape, np.ascontiguousarray(noise), inflation, int(is_residual), usual, factor))
@@ -94,25 +96,25 @@ def line_levels(noise: ComplexArray, inflation: float = 1.0, *, is_residual: boo
 
 
 def is_smooth(values: ComplexArray) -> bool:
-    """Whether errors, shape (n_series, n_freq), are smooth over frequency: by a lag-one autocorrelation above 1/2."""
+    """Return whether errors, shape (n_series, n_freq), are smooth: by a lag-one autocorrelation above 1/2."""
     neighbours = float((values[:, 1:] * values[:, :-1].conj()).real.sum())
     return neighbours > float(np.square(np.abs(values)).sum()) / 2
 
 
 def line_correlation(noise: ComplexArray, share: float = 0.0) -> float:
-    """How many neighbouring lines carry the noise of one independent line.
+    """Return the number of neighbouring lines that carry the noise of one independent line.
 
     Parameters
     ----------
     noise : ndarray, shape (n_entries, n_freq)
-        Noise of unit variance; NaN where it is not to count.
+        Noise of unit variance; NaN to exclude a value.
     share : float
-        Part of the noise power that smoothing has taken up, 0 for noise that no smooth FRF was subtracted from.
+        Part of the noise power that smoothing has absorbed, default 0 for noise without smoothing.
 
     Returns
     -------
     float
-        1 + 2 sum of the autocorrelations up to the first that is not significant; at least 1.
+        Value of 1 + 2 sum of the autocorrelations up to the first that is not significant; at least 1.
     """
     found, _ = call_for_number("line_correlation", (*noise.shape, noise.astype(np.complex128), share))
     return found
@@ -125,7 +127,9 @@ class ReciprocityDifferences:
     Attributes
     ----------
     rows, columns : ndarray of int, shape (n_pairs,)
+        Entries p and q.
     values : ndarray, shape (n_pairs, n_freq)
+        Differences.
     """
 
     rows: np.ndarray
@@ -133,7 +137,7 @@ class ReciprocityDifferences:
     values: ComplexArray
 
     def pair_variance(self, variance: FloatArray) -> FloatArray:
-        """Return the variance of the differences, shape (n_pairs, n_freq), by that of the FRFs."""
+        """Return the variance of the differences, shape (n_pairs, n_freq), from the variance of the FRFs."""
         total: FloatArray = (variance[:, self.rows, self.columns] + variance[:, self.columns, self.rows]).T
         return np.maximum(total, TINY)
 
@@ -143,15 +147,15 @@ class ReciprocityDifferences:
         Parameters
         ----------
         near : ndarray, shape (n_freq, m, m)
-            |h|^2 over neighbouring lines.
+            Squares |h|^2 over neighbouring lines.
         size : ndarray, shape (m, m)
-            Its medians.
+            Medians of `near`.
 
         Returns
         -------
         ndarray, shape (n_freq, m, m)
-            Both entries of a pair are given the same parts; an entry that is in no pair has the means of those in its
-            row and column, floors relative to the median of |h|^2.
+            Variance. Both entries of a pair have the same parts; an entry that is in no pair has the means of entries
+            in its row and column, floors relative to the median of |h|^2.
         """
         pair_size = size[self.rows, self.columns] + size[self.columns, self.rows]
         both: FloatArray = (near[:, self.rows, self.columns] + near[:, self.columns, self.rows]).T
@@ -177,19 +181,19 @@ class ReciprocityDifferences:
         return float(medians(np.abs(relative).ravel())) if is_smooth(relative) else 0.0
 
     def are_smooth(self, h: ComplexArray) -> bool:
-        """Whether the differences, relative to the FRFs (n_freq, m, m), are smooth over frequency."""
+        """Return whether the differences, relative to the FRFs (n_freq, m, m), are smooth over frequency."""
         return is_smooth(self._relative(h))
 
     def _relative(self, h: ComplexArray) -> ComplexArray:
         return np.asarray(self.values / np.sqrt(self.pair_variance(np.square(np.abs(h)))))
 
     def ratio(self, variance: FloatArray) -> float:
-        """Return the differences over what FRFs of this variance (n_freq, m, m) have, robustly."""
+        """Return the ratio of the differences to their size for FRFs of this variance (n_freq, m, m), robustly."""
         squares = abs(self.values) ** 2 / self.pair_variance(variance)
         return float(np.sqrt(medians(squares.ravel()) / np.log(2)))
 
     def common_level(self, h: ComplexArray, smooth: ComplexArray) -> float:
-        """Return the relative level of the noise where one is enough: for all pairs, no floor, both directions; else 0.
+        """Return one relative level if it describes the noise: all pairs, no floor, both directions; else 0.
 
         Parameters
         ----------
@@ -198,8 +202,8 @@ class ReciprocityDifferences:
 
         Notes
         -----
-        By the likelihood of the differences with one level against that with parts of each pair, and by the mean of
-        ln(|h_pq - s|^2 / |h_qp - s|^2), whose variance is pi^2/3 a line.
+        The likelihood of the differences with one level is compared with the one with parts of each pair. The mean of
+        ln(|h_pq - s|^2 / |h_qp - s|^2) is tested, whose variance is pi^2/3 a line.
         """
         squares, size = np.square(np.abs(self.values)), self.pair_variance(np.square(np.abs(h)))
         n_pairs, n_freq = squares.shape
@@ -215,24 +219,26 @@ class ReciprocityDifferences:
         return float(np.sqrt(power)) if is_common else 0.0
 
     def inflation(self, variance: FloatArray, line_factor: FloatArray) -> float:
-        """Return how many lines carry the noise of one independent line; outlying lines do not count."""
+        """Return the number of lines with the noise of one independent line; outlying lines do not count."""
         noise = self.values / np.sqrt(self.pair_variance(variance))
         return line_correlation(np.where(line_factor > 1, np.nan, noise))
 
 
 def reciprocity_differences(h: ComplexArray, groups: Sequence[EntryGroup]) -> ReciprocityDifferences | None:
-    """Differences of reciprocal entries of measured FRFs.
+    """Return differences of reciprocal entries of measured FRFs.
 
     Parameters
     ----------
     h : ndarray, shape (n_freq, n_out, n_in)
+        Measured FRFs.
     groups : sequence of EntryGroup
-        Of the entries of a reciprocal structure.
+        Groups of entries of a reciprocal structure.
 
     Returns
     -------
     ReciprocityDifferences or None
-        None where h is not square or was made reciprocal before. Entries that are zero to rounding do not count.
+        Differences; None if h is not square or was made reciprocal before. Entries that are zero to rounding do not
+        count.
     """
     if h.shape[1] != h.shape[2]:
         return None

@@ -10,8 +10,8 @@ from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["medians", "quantiles"]
 
-#: Rows of at most so many numbers are sorted: that takes no longer than a partition at one place, which leaves the
-#: number below it to be looked for.
+#: Largest length of rows that are sorted: this takes no longer than a partition at one place, after which the next
+#: lower number has to be searched.
 _SHORT = 64
 
 
@@ -21,7 +21,7 @@ def medians(values: FloatArray) -> FloatArray:
     Parameters
     ----------
     values : ndarray, shape (..., n), n > 0
-        Without NaN.
+        Numbers without NaN.
 
     Examples
     --------
@@ -45,9 +45,9 @@ def quantiles(values: FloatArray, shares: Sequence[float]) -> list[float]:
     Parameters
     ----------
     values : ndarray, shape (n,), n > 0
-        Without NaN.
+        Numbers without NaN.
     shares : sequence of float
-        From 0 to 1.
+        Probabilities of the quantiles, 0 to 1.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Which FRF came from which set-up of a test, what was measured in several, and what is known of their gains."""
+"""Set-up of each FRF of a test, FRFs that were measured in several set-ups, and calibration of their gains."""
 
 from __future__ import annotations
 
@@ -21,31 +21,32 @@ __all__ = ["SetUps"]
 
 @dataclass(frozen=True, eq=False)
 class SetUps:
-    """Set-ups of one test: FRFs that were measured with the same sensors in the same places, the same day.
+    """Set-ups of one test: FRFs that were measured with the same sensors at the same places, on the same day.
 
-    FRFs of one set-up share its errors: gain and delay of sensors and hammer as they were then. `merge_frfs` keeps
-    them, `FrfSet.setups_between` hands them to `identify` and `identify_model`.
+    FRFs of one set-up share its errors: gain and delay of sensors and hammer. `merge_frfs` keeps the set-ups, and
+    `FrfSet.setups_between` returns them for `identify` and `identify_model`.
 
     Parameters
     ----------
     names : sequence of str
-        Of the set-ups, such as their files.
+        Names of the set-ups, such as their files.
     of : array_like of int, shape (n_responses, n_excitations)
-        Number of the set-up that each FRF is of, counted from 0; -1 where there is no FRF.
+        Number of the set-up of each FRF, counted from 0; -1 if there is no FRF.
     gain : float, optional
-        Relative standard deviation of the gain of one set-up, by its calibration: 0.01 for 1 %. By default it is found
-        from what set-ups differ by.
+        Relative standard deviation of the gain of one set-up, by its calibration: 0.01 for 1 %. By default it is
+        estimated from the differences of set-ups.
     common_gain : float
-        That of a gain which all set-ups share: the same hammer, the same calibrator. No FRF shows it.
+        Relative standard deviation of a gain which all set-ups share: the same hammer, the same calibrator; default 0.
+        No FRF shows it.
     repeats : array_like of int, shape (n_repeats, 3)
-        Response, excitation and set-up of FRFs that were measured in another set-up, too.
+        Response, excitation and set-up of FRFs that were measured in another set-up, too; none by default.
     repeated : array_like of complex, shape (n_freq, n_repeats)
-        These, in the quantity of the FRFs.
+        Values of the repeated FRFs, in the quantity of the FRFs.
 
     Raises
     ------
     ValueError, TypeError
-        Numbers of set-ups or of FRFs that there are not, wrong shapes, a gain that is negative.
+        Numbers of set-ups or of FRFs that do not exist, wrong shapes, a gain that is negative.
 
     Examples
     --------
@@ -70,21 +71,21 @@ class SetUps:
         if not names:
             raise ValueError("names must name at least one set-up")
         if of.size and not (of.min() >= -1 and of.max() < len(names)):
-            raise ValueError(f"of must hold numbers of {len(names)} set-ups from 0, or -1 where there is no FRF")
+            raise ValueError(f"of must contain numbers of {len(names)} set-ups from 0, or -1 where there is no FRF")
         if repeats.shape[1] != 3:
             raise ValueError(
                 f"repeats must have three columns, response, excitation and set-up, not {repeats.shape[1]}"
             )
         limits = np.array([*of.shape, len(names)])
         if (repeats < 0).any() or (repeats >= limits).any():
-            raise ValueError("repeats must hold numbers of responses, excitations and set-ups that there are")
+            raise ValueError("repeats must contain numbers of responses, excitations and set-ups that there are")
         if (self.repeated is None) != (len(repeats) == 0):
             raise ValueError("repeats and repeated go together: places and values of FRFs measured again")
         repeated = None
         if self.repeated is not None:
             repeated = as_array("repeated", self.repeated)
             if repeated.dtype.kind not in "biufc" or repeated.ndim != 2 or repeated.shape[1] != len(repeats):
-                raise ValueError(f"repeated must hold numbers in {len(repeats)} columns, one for each row of repeats")
+                raise ValueError(f"repeated must contain numbers in {len(repeats)} columns, one for each repeat")
             repeated = np.ascontiguousarray(repeated, np.complex128)
         object.__setattr__(self, "names", names)
         object.__setattr__(self, "of", of)
@@ -95,7 +96,7 @@ class SetUps:
         object.__setattr__(self, "common_gain", as_not_negative("common_gain", self.common_gain))
 
     def check_fits(self, shape: tuple[int, ...], name: str = "setups") -> None:
-        """Raise a ValueError where they are not those of FRFs of shape (n_freq, n_responses, n_excitations)."""
+        """Raise a ValueError if they do not match FRFs of shape (n_freq, n_responses, n_excitations)."""
         if self.of.shape != tuple(shape[1:]):
             raise ValueError(f"{name} is of {_by(self.of.shape)} FRFs, not {_by(shape[1:])}")
         if self.repeated is not None and len(self.repeated) != shape[0]:
@@ -106,13 +107,13 @@ class SetUps:
         return self if self.repeated is None else replace(self, repeated=self.repeated[kept])
 
     def times(self, factor: ComplexArray | FloatArray | float) -> SetUps:
-        """Return the same with FRFs measured again times a factor of each line, shape (n_freq, 1), or of all."""
+        """Return the same with repeated FRFs multiplied by a factor of each line, shape (n_freq, 1), or of all."""
         return self if self.repeated is None else replace(self, repeated=self.repeated * factor)
 
     def between(
         self, rows: NDArray[np.intp], columns: NDArray[np.intp], signs: FloatArray, known: NDArray[np.bool_]
     ) -> SetUps:
-        """Return the same for FRFs at these places, shape (n_out, n_in) each, with their signs; `known` are there."""
+        """Return the same for FRFs at these places, shape (n_out, n_in) each, with their signs, if in `known`."""
         found, values = [], []
         for number, (row, column, setup) in enumerate(self.repeats.tolist()):
             for i, j in np.argwhere((rows == row) & (columns == column) & known).tolist():
@@ -128,7 +129,7 @@ class SetUps:
 
     @property
     def counts(self) -> NDArray[np.intp]:
-        """How many FRFs each set-up has."""
+        """Number of FRFs of each set-up."""
         return np.bincount(self.of[self.of >= 0], minlength=len(self.names)).astype(np.intp)
 
     def __repr__(self) -> str:
@@ -138,9 +139,9 @@ class SetUps:
 def _whole_numbers(name: str, values: object, axes: int) -> NDArray[np.intp]:
     found = as_array(name, values)  # type: ignore[arg-type]
     if found.ndim != axes or found.dtype.kind not in "iuf":
-        raise ValueError(f"{name} must hold whole numbers in rows and columns")
+        raise ValueError(f"{name} must contain whole numbers in rows and columns")
     if not np.isfinite(found).all() or (found != np.round(found)).any() or abs(found).max(initial=0) > 2**31:
-        raise ValueError(f"{name} must hold whole numbers")
+        raise ValueError(f"{name} must contain whole numbers")
     return found.astype(np.intp)
 
 

@@ -1,4 +1,4 @@
-"""Smooth FRFs: rational functions with common poles through measured ones."""
+"""Smooth FRFs: rational functions with common poles, fitted to measured FRFs."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ __all__ = [
     "smoothed_in_pieces",
 ]
 
-#: Fewer lines are returned as measured: a pole and its residues take three of them.
+#: Number of lines below which FRFs are returned as measured: a pole and its residues take three of them.
 _FEWEST_LINES = 16
-#: A residual below this share of the FRFs is an error of the rational functions rather than noise.
+#: Residual, as a share of the FRFs, below which it is an error of the rational functions rather than noise.
 _EXACT = 1e-4
-#: The residual about smooth FRFs with the poles of others is this many times their noise at most.
+#: Largest ratio of the residual about smooth FRFs with the poles of others to their noise.
 _LIKE = 1.2
-#: Share of the median of |h|^2 that first weights add to |h|^2: a floor of 30 % of the median of |h|.
+#: Share of the median of |h|^2 that is added to |h|^2 in first weights: a floor of 30 % of the median of |h|.
 _FIRST_FLOOR = 0.09
 
 
@@ -55,10 +55,11 @@ class OrderSearch:
     Attributes
     ----------
     inflation : float, optional
-        Lines that carry the noise of one independent line; found from the residual if it is None.
+        Number of lines that carry the noise of one independent line; by default estimated from the residual.
     max_poles : int
+        Largest number of poles.
     patience : int
-        Orders in a row that may gain nothing before the search ends; 0 for no further poles.
+        Number of orders in a row without gain after which the search ends; 0 for no further poles.
     """
 
     inflation: float | None = 1.0
@@ -73,18 +74,17 @@ class SmoothFrfs:
     Attributes
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     h : ndarray, shape (n_freq, n_out, n_in)
-        Smooth FRFs in the unit of the measured ones; reciprocal where the structure is.
+        Smooth FRFs in the unit of the measured ones; reciprocal if the structure is.
     is_smooth : bool
-        False where there are too few lines, or no noise that could be removed: `h` is then what was measured.
+        Whether `h` is smooth. It contains the measured FRFs if there are too few lines, or no noise to remove.
     poles : tuple of ndarray
-        Poles of positive frequencies, rad/s, of each group of coupled entries; one piece of the lines after the other
-        where they are many.
+        Poles of positive frequencies, rad/s, of each group of coupled entries, one piece of the lines after the other.
     level : float
-        Root mean square of measured minus smooth relative to sqrt(variance), corrected for the parameters.
+        Root mean square of measured minus smooth FRFs relative to sqrt(variance), corrected for the parameters.
     share : ndarray, shape (n_out, n_in)
-        Parameters over data: the part of the noise power of an entry that its smooth FRF has taken up, if the noise of
+        Parameters over data: the part of the noise power of an entry that its smooth FRF has absorbed, if the noise of
         neighbouring lines is independent.
     """
 
@@ -97,11 +97,11 @@ class SmoothFrfs:
 
     @property
     def order(self) -> int:
-        """Number of poles of the group that has most."""
+        """Number of poles of the group with most poles."""
         return max((len(poles) for poles in self.poles), default=0)
 
     def is_like(self, level: float) -> bool:
-        """Whether these FRFs, with the poles of others, leave no more than noise of the level of the others."""
+        """Return whether these FRFs, with the poles of others, leave no more than their noise level."""
         return self.is_smooth and self.level < _LIKE * level
 
 
@@ -114,26 +114,27 @@ def smooth_frfs(
     reciprocal: bool = True,
     max_poles: int = 60,
 ) -> SmoothFrfs:
-    """Smooth measured FRFs by rational functions of frequency with common poles.
+    """Return smooth FRFs: rational functions of frequency with common poles, fitted to measured FRFs.
 
     Parameters
     ----------
     freq_hz : array_like, shape (n_freq,)
         Lines in Hz, all different, in any spacing.
     h : array_like, shape (n_freq, n_out, n_in)
-        Measured FRFs.
+        Measured FRFs, in any unit.
     variance : array_like, shape (n_freq, n_out, n_in), optional
-        E|e|^2 of each FRF up to one factor, > 0; default |h|^2 (noise of the same relative level everywhere).
+        Noise variance E|e|^2 of each FRF up to one factor, > 0; default |h|^2 (equal relative noise everywhere).
     inflation : float
-        How many neighbouring lines carry the noise of one independent line, >= 1.
+        Number of neighbouring lines that carry the noise of one independent line, >= 1, default 1.
     reciprocal : bool
         Whether h_pq and h_qp of square matrices are the same FRF.
     max_poles : int
-        Most poles of a group of coupled entries.
+        Largest number of poles of a group of coupled entries.
 
     Returns
     -------
     SmoothFrfs
+        Smooth FRFs, with poles and level of the residual.
 
     Raises
     ------
@@ -141,14 +142,18 @@ def smooth_frfs(
         Wrong shapes, NaN or Inf in a line, two lines of the same frequency, a variance that is not positive, an
         inflation below 1.
 
+    See Also
+    --------
+    estimate_noise : smooth FRFs together with their unknown noise.
+
     Notes
     -----
-    Poles by relaxed vector fitting with weights 1/variance; their number by generalised cross-validation, from the
-    peaks of the FRFs upwards, new poles where the residual is largest. Only poles of positive frequencies are taken,
-    with complex residues: receptance with structural damping is met exactly by as many poles as there are modes near
-    the lines and a few more for all others. Entries that are zero (by symmetry) stay out, and groups of entries that
-    are not coupled have poles of their own. Work is proportional to n_freq n_entries n_poles^2. More than 8192 lines
-    are cut into pieces of equal length, each smoothed by itself.
+    Poles by relaxed vector fitting with weights 1/variance; their number by generalised cross-validation. The search
+    starts at the peaks of the FRFs and adds poles at the largest residual. Only poles of positive frequencies are used,
+    with complex residues. A receptance with structural damping is fitted exactly by as many poles as there are modes
+    near the lines, and a few more for all further modes. Entries that are zero (by symmetry) are omitted, and groups of
+    uncoupled entries have separate poles. Work is proportional to n_freq n_entries n_poles^2. More than 8192 lines are
+    cut into pieces of equal length, each smoothed separately.
 
     Examples
     --------
@@ -197,12 +202,12 @@ def smoothed_in_pieces(
 
 
 def pieces(order: NDArray[np.intp]) -> list[NDArray[np.intp]]:
-    """Cut lines in rising order into chunks that are smoothed separately: memory does not grow with the lines."""
+    """Return chunks of lines in rising order, which are smoothed separately: memory does not grow with the lines."""
     return [order[own] for own in line_slices(len(order))]
 
 
 def joined(places: Sequence[NDArray[np.intp]], parts: Iterable[SmoothFrfs], shape: tuple[int, ...]) -> SmoothFrfs:
-    """Return smooth FRFs of this shape, pieces at their places; poles are those of each, level and share means."""
+    """Return smooth FRFs of this shape from pieces, with the poles of each piece and the means of level and share."""
     freq, h, share = np.empty(shape[0]), np.empty(shape, np.complex128), np.zeros(shape[1:])
     is_smooth, power = False, 0.0
     poles: list[ComplexArray] = []
@@ -267,8 +272,9 @@ class _FittedPoles(NamedTuple):
     Attributes
     ----------
     poles : ndarray, shape (n_poles,)
-        rad/s.
+        Poles, rad/s.
     smooth : ndarray, shape (n_entries, n_freq)
+        Smooth FRFs.
     squares : float
         Sum of |h - smooth|^2 over the variance.
     is_exact : bool
@@ -289,7 +295,7 @@ def _smooth_group(
     search: OrderSearch,
     start: ComplexArray,
 ) -> _FittedPoles:
-    """Fit of one group."""
+    """Return the fit of one group."""
     if variance is not None:
         return _fitted(freq, *group.means(h, variance), search, start)
     near = near_squares(h)
@@ -302,7 +308,7 @@ def _smooth_group(
 def _fitted(
     freq: FloatArray, h: ComplexArray, variance: FloatArray, search: OrderSearch, start: ComplexArray
 ) -> _FittedPoles:
-    """Fit of FRFs, one a row, from poles `start`, or those at their peaks."""
+    """Return the fit of FRFs, one a row, from poles `start`, or from poles at their peaks."""
     poles, smooth = np.zeros(search.max_poles, np.complex128), np.empty_like(h)
     poles[: len(start)] = start[: search.max_poles]
     sizes = (*h.shape, search.max_poles, min(len(start), search.max_poles), search.patience, search.inflation or 0.0)
@@ -313,12 +319,12 @@ def _fitted(
 
 
 def first_variance(near: FloatArray, usual: FloatArray) -> FloatArray:
-    """Variance before anything is known of the noise: |h|^2 over neighbouring lines, and a part of its median."""
+    """Return a variance without information on the noise: |h|^2 over neighbouring lines, and a part of its median."""
     return np.maximum(near + _FIRST_FLOOR * usual, TINY)
 
 
 def near_squares(h: ComplexArray) -> FloatArray:
-    """Mean of |h|^2 over each line and its neighbours; those at the ends count twice."""
+    """Return the mean of |h|^2 over each line and its neighbours; lines at the ends count twice."""
     squares: FloatArray = h.real**2 + h.imag**2
     near = squares.copy()
     near[1:] += squares[:-1]

@@ -1,4 +1,4 @@
-"""Noise as a user states it: a part relative to the FRFs, and floors that do not depend on them."""
+"""Noise stated by a user: a part relative to the FRFs, and floors that do not depend on them."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class StatedNoise:
     relative : float
         Standard deviation relative to the FRF, 0.01 for 1 %, default 0.
     receptance, mobility, accelerance : float
-        Floors: standard deviations that do not depend on the FRF, in m/N, m/(s N) and m/(s^2 N), default 0. An FRF of a
-        rotation or a moment has the same numbers in its own units.
+        Floors: standard deviations that do not depend on the FRF, in m/N, m/(s N) and m/(s^2 N), default 0. For an FRF
+        of a rotation or a moment the numbers are the same in its units.
 
     Raises
     ------
@@ -66,13 +66,14 @@ class StatedNoise:
         Parameters
         ----------
         freq_hz : array_like, shape (n_freq,)
-            Hz; above 0 if the noise has a floor of mobility or accelerance.
+            Frequencies, Hz; above 0 if the noise has a floor of mobility or accelerance.
         h : array_like, shape (n_freq, n_out, n_in)
-            m/N.
+            Receptances, m/N.
 
         Returns
         -------
         ndarray, shape of h
+            Variance, (m/N)^2.
         """
         lines = as_lines("h", h)
         of_floors = self.floor_variance(as_frequency(freq_hz, len(lines)))
@@ -93,5 +94,5 @@ class StatedNoise:
         return found
 
     def of_mean(self, averages: float) -> StatedNoise:
-        """Return the noise of the mean of so many measurements."""
+        """Return the noise of the mean of this number of measurements."""
         return StatedNoise(**{one.name: getattr(self, one.name) / averages**0.5 for one in fields(self)})

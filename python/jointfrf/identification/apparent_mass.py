@@ -1,6 +1,6 @@
-"""Apparent mass of each side of a joint, and static compliances: what the FRFs say of their common scale.
+"""Apparent mass of each side of a joint, and static compliances: a check of the common scale of the FRFs.
 
-Ratios of FRFs do not show a factor that all FRFs share, such as a unit of acceleration; one known mass does.
+Ratios of FRFs do not show a factor that all FRFs share, such as a unit of acceleration. One known mass shows it.
 """
 
 from __future__ import annotations
@@ -26,26 +26,27 @@ __all__ = [
     "model_mass",
 ]
 
-#: Lines of the first fit, and by how much each next one has more.
+#: Number of lines of the first fit, and the ratio by which it grows from fit to fit.
 _FIRST, _GROWTH = 8, 1.25
-#: Chance of larger squares below which lines are not on the mass line, and above which their series is taken.
+#: Probability of a larger sum of squares: below the first value, lines are not on the mass line; above the second, the
+#: series is accepted.
 _UNFIT, _FIT = 1e-3, 0.05
 #: Standard deviations of a 95 % interval.
 _REACH = 1.96
 #: Relative standard error above which a number is not stated, and share of the next term of the series at the lowest
 #: line above which this line is not on the mass line, or not static.
 KNOWN = 0.2
-#: What a stated mass may be off: sensors, cables, rotations that were not measured.
+#: Relative error that is allowed for a stated mass: sensors, cables, rotations that were not measured.
 _STATED = 0.2
-#: Factors between FRFs in SI units and FRFs in other units, by what was taken for what.
+#: Factors between FRFs in SI units and FRFs in other units, by the mistaken unit.
 _FACTORS = {
     9.80665: "accelerations in g", 4.448222: "forces in lbf", 1000.0: "lengths in mm or forces in kN",
     (2 * np.pi) ** 2: "frequencies in rad/s called Hz", 386.0886: "accelerations in g and lengths in inches",
     39.37008: "lengths in inches",
 }  # fmt: skip
-#: Forces of a rigid motion below this share of those of single DOFs are rounding.
+#: Share of the forces of single DOFs below which forces of a rigid motion are rounding.
 _ROUNDING = 1e-6
-#: How near a ratio must be to a factor, relative to it, where its own error is smaller.
+#: Relative distance of a ratio from a factor up to which they agree, if the standard error of the ratio is smaller.
 _NEAR = 0.1
 
 
@@ -56,12 +57,15 @@ class ApparentMass:
     Attributes
     ----------
     side : {"j", "k", "j and k"}
+        Side of the joint, or both sides together.
     direction : str
+        Axis of the translation.
     value, std_error : float
+        Mass and its standard error, kg.
     highest : float
         Highest frequency used, Hz.
     is_least : bool
-        Whether the mass may be larger: rotations of the body, which were not measured, lower it.
+        Whether the mass may be larger, because rotations of the body, which were not measured, reduce it.
     """
 
     side: str
@@ -92,13 +96,14 @@ class StaticCompliance:
 
 @dataclass(frozen=True)
 class ApparentScale:
-    """What low frequencies say of masses and compliances; empty where they say nothing.
+    """Apparent masses and compliance from low frequencies; empty if the data determine none.
 
     Attributes
     ----------
     masses : tuple of ApparentMass
+        Masses in each direction.
     compliance : StaticCompliance or None
-        The largest one.
+        Largest static compliance.
     """
 
     masses: tuple[ApparentMass, ...] = ()
@@ -106,11 +111,11 @@ class ApparentScale:
 
     @property
     def of_both(self) -> tuple[ApparentMass, ...]:
-        """Masses of both sides together."""
+        """Return the masses of both sides together."""
         return tuple(one for one in self.masses if one.side == "j and k")
 
     def of_side(self, side: str) -> ApparentMass | None:
-        """Return the best-known mass of a side, or the largest that it is at least."""
+        """Return the most precise mass of a side; if there is none, the largest lower bound."""
         own = [one for one in self.masses if one.side == side]
         whole = [one for one in own if not one.is_least]
         best = min(whole, key=lambda one: one.std_error / one.value, default=None)
@@ -119,7 +124,7 @@ class ApparentScale:
         return max(own, key=lambda one: one.value - _REACH * one.std_error, default=None)
 
     def text(self) -> Iterator[str]:
-        """Say it, a line for masses and one for the compliance."""
+        """Yield a line of text for the masses and one for the compliance."""
         found = [f"{one} of side {side}" for side in "jk" if (one := self.of_side(side)) is not None]
         both = self.of_side("j and k")
         found += [f"{both} of both"] if both is not None else []
@@ -129,7 +134,7 @@ class ApparentScale:
             yield f"largest static compliance: {self.compliance}"
 
     def contradiction(self, side: str, stated: float) -> str | None:
-        """Return a sentence about a stated mass that the FRFs contradict, kg; None if they agree or say nothing."""
+        """Return a sentence if the FRFs contradict a stated mass, kg; None if they agree or determine no mass."""
         own = self.of_side(side)
         if own is None or abs(own.value - stated) <= _REACH * own.std_error + _STATED * stated:
             return None
@@ -142,7 +147,7 @@ class ApparentScale:
 
 
 def common_factor(ratio: float, error: float = 0.0) -> str | None:
-    """Return what would explain a ratio of masses, apparent over true: units, each with its factor; None if nothing."""
+    """Return an explanation of a ratio of apparent to true mass: units, each with its factor; None if there is none."""
     near = np.log1p(max(error, _NEAR))
     causes = [
         f"a factor of {factor**power:.4g} ({words}{'' if power > 0 else ', the other way round'})"
@@ -161,15 +166,16 @@ def apparent_scale(
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     gamma, variance : ndarray, shape (n_freq, 2 n, 2 n)
-        Receptances between joint DOFs j, then k, m/N, and E|e|^2.
+        Receptances between joint DOFs j, then k, m/N, and the noise variance E|e|^2, (m/N)^2.
     dofs : sequence of str, length n
+        Names of the joint DOFs.
 
     Returns
     -------
     ApparentScale
-        Only numbers that are known to 20 %.
+        Masses and compliance with a standard error below 20 %.
 
     Notes
     -----
@@ -192,7 +198,7 @@ def apparent_scale(
 
 
 def _of_side(side: str, gamma: ComplexArray, variance: FloatArray) -> tuple[ComplexArray, FloatArray]:
-    """Return receptances of a side without the joint and the other side, and their variance; NaN if singular."""
+    """Return receptances of a side without the joint and the second side, and their variance; NaN if singular."""
     n = gamma.shape[1] // 2
     both = np.vstack([np.eye(n), np.eye(n)])
     one = both * np.repeat([side == "j", side == "k"], n)[:, None]
@@ -236,7 +242,7 @@ def _masses(
 
 
 def _is_known(value: float, error: float, next_term: float = 0.0) -> bool:
-    """Whether a number is positive and known, and the next term of its series small at the lowest line."""
+    """Return whether a number is positive and precise, and the next term of its series small at the lowest line."""
     return max(error, abs(next_term)) < KNOWN * value
 
 
@@ -254,7 +260,7 @@ def _compliances(
 def _series(omega: FloatArray, y: FloatArray, std: FloatArray) -> tuple[FloatArray, FloatArray, int] | None:
     """Fit a series in w^2 to the lowest lines; return terms, standard errors, and the last line.
 
-    As many lines are used as three terms clearly fit; one more term takes up what three have missed there.
+    The fit uses as many lines as three terms fit; one more term absorbs the remaining misfit on these lines.
     """
     count, last = _FIRST, None
     while count <= omega.size:

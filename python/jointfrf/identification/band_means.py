@@ -1,4 +1,4 @@
-"""The mean of K*(w) over bands, as the thesis takes it."""
+"""Means of K*(w) over bands, by the methods of the thesis."""
 
 from __future__ import annotations
 
@@ -39,34 +39,39 @@ def identify_band_mean(
 ) -> Fit:
     """Identify a joint by a method of the thesis: K*(w) of each line by itself, averaged over sensitive bands.
 
-    `identify` needs no bands and no models, and has the error bars of its noise; this is what the thesis does.
+    `identify` needs no bands and no models and gives intervals for the noise. This function reproduces the thesis.
 
     Parameters
     ----------
     freq_hz : array_like, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     measured : array_like, shape (n_freq, 2 n, 2 n), (n_freq, m, m) with `transform`, or (n_freq, n, n) for decoupling
-        Receptances, m/N: at joint DOFs j, then k; or at the points that `transform` takes there; or, for decoupling,
-        between the internal points that the equation names.
+        Receptances, m/N, at joint DOFs j, then k, or at the channels of `transform`. For decoupling: receptances
+        between the internal points in the equation.
     method : str
-        "ismm", "ismm-kj": inverse structural modification (2.47) with D_jk or D_kj, need `alpha` and `k_initial`.
-        "inverse-substructuring": -(gamma^-1)_jk, which ISMM reduces to. "decoupling-rr", "-rs", "-sr", "-ss":
-        (2.53)-(2.56), need `h_a`, `h_b` and the DOF lists.
-    dofs, bands
-        As in `identify`.
+        Name of the method. "ismm", "ismm-kj": inverse structural modification (2.47) with D_jk or D_kj, need `alpha`
+        and `k_initial`. "inverse-substructuring": -(gamma^-1)_jk, to which ISMM reduces. "decoupling-rr", "-rs", "-sr",
+        "-ss": (2.53)-(2.56), need `h_a`, `h_b` and the DOF lists.
+    dofs : sequence of str
+        Names of the n joint DOFs; names that begin with theta, rx, ry or rz are rotations.
+    bands : (low, high), sequence of these, or mapping of DOF name to these
+        Sensitive bands, Hz.
     transform : array_like, shape (2 n, m), or Interface, optional
-        From channels to joint DOFs j, then k.
+        Matrix from channels to joint DOFs j, then k; none by default.
     alpha : array_like, shape (n_freq, 2 n, 2 n), optional
-        Calculated receptance of the assembly with the first estimate, for ISMM.
+        Receptance of the assembly calculated with the initial value of K*, m/N, for ISMM.
     k_initial : array_like, shape (n_freq, n, n) or (n, n), optional
-        First estimate K0, for ISMM.
-    h_a, h_b, dofs_j, dofs_k, dofs_r, dofs_s : optional
-        As in `decouple`.
+        Initial value K0 of the dynamic stiffness, N/m, for ISMM.
+    h_a, h_b : array_like, optional
+        Receptances of the substructures, m/N, for decoupling; see `decouple`.
+    dofs_j, dofs_k, dofs_r, dofs_s : sequence of int, optional
+        Positions of joint and internal DOFs in `h_a` and `h_b`, for decoupling; see `decouple`.
 
     Returns
     -------
     Fit
-        Stiffness and viscous damping. Standard errors: the scatter of the lines over the root of their number; the bias
+        Stiffness and viscous damping. The standard error is the scatter of the lines over the root of their number; it
+        does not contain the bias of a mean by noise.
         of a mean by noise is not included.
 
     Raises
@@ -75,6 +80,11 @@ def identify_band_mean(
         Wrong shapes, names, bands; NaN or Inf in a line; an argument that the method needs is missing.
     SingularLineError
         A line cannot be inverted.
+
+    See Also
+    --------
+    identify : fit by maximum likelihood, without bands or models.
+    decouple : K* line by line.
 
     Examples
     --------
@@ -119,7 +129,7 @@ def identify_band_mean(
 
 
 def _scatter(freq: FloatArray, k: ComplexArray, bands_of_dofs: tuple[tuple[Band, ...], ...]) -> FloatArray:
-    """Return standard errors of the means: the scatter of the lines over the root of their number."""
+    """Return the standard errors of the means: the scatter of the lines over the root of their number."""
     omega = np.where(freq > 0, 2 * np.pi * freq, np.nan)[:, None, None]
     errors = []
     for part in (k.real, k.imag / omega):

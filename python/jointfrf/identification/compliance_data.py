@@ -1,4 +1,4 @@
-"""What a compliance fit shows beside its numbers: FRFs regenerated with the joint, and what each line shows."""
+"""Data of the figures of a compliance fit: FRFs regenerated with the joint, and the contribution of each line."""
 
 from __future__ import annotations
 
@@ -32,24 +32,24 @@ __all__ = [
     "regenerated_frfs",
 ]
 
-#: Steps of the projection.
+#: Number of projections.
 _STEPS = 30
-#: Errors whose effect is computed: a delay of all forces, s; sensors that all resonate at so many times the highest
+#: Errors whose effect is computed: a delay of all forces, s; a resonance of all sensors at this multiple of the highest
 #: line; the share of noise in the power of the force; the standard deviation of positions, m.
 _DELAY, _RESONANCE, _FORCE_NOISE, _POSITION = 1e-6, 10.0, 0.01, 1e-3
-#: Directions of less information than this share of the largest are not seen by a line.
+#: Share of the largest information below which a line does not determine a direction.
 _SEEN = 1e-10
 
 
 def compliance_data(
     found: ManifoldFit, problem: FitProblem, transform: Transform | tuple[Transform, Transform] | None
 ) -> FitData:
-    """Gather what a fit was made from; `transform` as in `identify`."""
+    """Return the data behind a fit; `transform` as in `identify`."""
     frfs = problem.frfs
     fitted = problem.used.copy()
     for group in found.estimate.groups:
         fitted[:, group.dofs] &= group.used[:, None]
-    # A level that was assumed has been replaced by that of the residual.
+    # The level of the residual replaces an assumed level.
     scale = (found.noise_level / problem.noise.level) ** 2 if problem.noise.is_assumed else 1.0
     pair = as_pair(transform)
     names = channel_names(frfs, problem.dofs, pair)
@@ -88,7 +88,7 @@ def as_pair(transform: Transform | tuple[Transform, Transform] | None) -> tuple[
 
 
 def _modes(frfs: InterfaceFrfs) -> tuple[FloatArray, FloatArray] | None:
-    """Return the rigid motion of responses and of forces, where both are known."""
+    """Return the rigid motion of responses and of forces, if both are known."""
     if Transforms(frfs.responses, frfs.forces).are_units:
         return frfs.responses, frfs.forces
     if frfs.response_modes is None or frfs.force_modes is None:
@@ -115,19 +115,21 @@ def channel_names(
 
 
 def regenerated_frfs(found: JointEstimate, n: int, lines: slice) -> ComplexArray:
-    """Return the FRFs between joint DOFs nearest to the measured ones among all that fit the joint found.
+    """Return the FRFs between joint DOFs that fit the identified joint and are nearest to the measured FRFs.
 
     Parameters
     ----------
     found : JointEstimate
+        Estimate of the joint.
     n : int
-        Joint DOFs.
+        Number of joint DOFs.
     lines : slice
+        Frequency lines to return.
 
     Returns
     -------
     ndarray, shape (lines, 2 n, 2 n)
-        m/N; zero between DOFs of different groups, NaN on lines where no such FRFs were found.
+        Receptances, m/N; zero between DOFs of different groups, NaN on lines without such FRFs.
     """
     parts = [(group, _of_group(group, lines)) for group in found.groups]
     gamma = np.zeros((len(parts[0][1]), 2 * n, 2 * n), np.complex128)
@@ -199,18 +201,18 @@ def hidden_errors(
 
 
 def information_shares(found: JointEstimate) -> FloatArray:
-    """Return the share of each line in what is known of each parameter, shape (n_freq, p); sums are 1.
+    """Return the share of each line in the information on each parameter, shape (n_freq, p); the shares sum to 1.
 
     Notes
     -----
-    With A the information on the coordinates x of all lines, A_l that of a line, and s = dtheta/dx, the variance of a
-    parameter is s^T A^-1 s, and to first order a line of weight 1 + w changes it by -w s^T A^-1 A_l A^-1 s.
+    A is the information of all lines on the coordinates x, A_l is the information of line l, and s = dtheta/dx. The
+    variance of a parameter is s^T A^-1 s. To first order a line of weight 1 + w changes it by -w s^T A^-1 A_l A^-1 s.
     """
     n_freq = len(found.groups[0].used)
     share = np.zeros((n_freq, len(found.parameters)))
     for group in found.groups:
         slope = group.joint.theta_slope(group.x)
-        # Only shares count: rows of any size, also those of a rigid DOF.
+        # Only shares count, so rows may have any scale, also the row of a rigid DOF.
         slope = np.nan_to_num(slope / np.maximum(abs(slope).max(axis=1, keepdims=True), np.finfo(float).tiny))
         to = slope @ inverse_information(group.information)
         own = np.einsum("pa,lab,pb->lp", to, group.of_lines().information, to, optimize=True)

@@ -17,7 +17,7 @@ from jointfrf.kernel.arguments import FloatArray, one_line
 
 __all__ = ["Derived", "DerivedFunction", "derived_quantity"]
 
-#: From values by name to a number.
+#: Function that maps values by name to a number.
 DerivedFunction = Callable[[Mapping[str, float]], float]
 
 _OPERATORS: Mapping[type[ast.AST], Callable[..., float]] = {
@@ -30,14 +30,16 @@ _STEP = 1e-3
 
 
 class Derived(NamedTuple):
-    """A function of the parameters.
+    """Function of the parameters with its uncertainty.
 
     Attributes
     ----------
     value : float
+        Value at the estimate.
     std_error : float
+        Standard error, to first order.
     low, high : float
-        Its interval; inf where the data give no limit.
+        Limits of the interval; inf if the data give no limit.
     """
 
     value: float
@@ -54,18 +56,22 @@ def derived_quantity(
     intervals: Callable[[float], dict[str, tuple[float, float]]],
     probability: float,
 ) -> Derived:
-    """Return a function of the parameters of a fit; as `Fit.derived`.
+    """Return a function of the parameters of a fit with its uncertainty; see `Fit.derived`.
 
     Parameters
     ----------
-    function, probability
-        As in `Fit.derived`.
+    function : callable or str
+        Function of the parameters by name, or an arithmetic expression of their names.
+    probability : float
+        Coverage probability of the interval.
     names : sequence of str, length p
+        Names of the parameters.
     values : ndarray, shape (p,)
+        Estimates.
     covariance : ndarray, shape (p, p)
+        Covariance of the estimates.
     intervals : callable
-        From a probability to the interval of each parameter; its method `of_function`, where it has one, profiles the
-        likelihood.
+        Intervals of all parameters at a probability; its method `of_function`, if present, profiles the likelihood.
     """
     of_values = _parsed(function, names) if isinstance(function, str) else function
     if not callable(of_values):
@@ -79,7 +85,7 @@ def derived_quantity(
         except ValueError:  # a root or a logarithm of a negative number
             return math.nan
 
-    value, slope = at(values), _slope(at, values, np.sqrt(np.maximum(np.diagonal(covariance), 0)))
+    value, slope = at(values), _gradient(at, values, np.sqrt(np.maximum(np.diagonal(covariance), 0)))
     used = np.flatnonzero(slope)
     own = slope[used] @ covariance[used[:, None], used] @ slope[used]
     std_error = float(np.sqrt(own)) if own > 0 else (math.nan if math.isnan(own) else 0.0)
@@ -99,8 +105,8 @@ def derived_quantity(
     return Derived(value, std_error, value - reach, value + reach)
 
 
-def _slope(at: Callable[[FloatArray], float], best: FloatArray, errors: FloatArray) -> FloatArray:
-    """Return the derivatives of a function at the values found; 0 by those that it does not depend on."""
+def _gradient(at: Callable[[FloatArray], float], best: FloatArray, errors: FloatArray) -> FloatArray:
+    """Return the derivatives of a function at the estimate; 0 for parameters that do not enter."""
     slope = np.zeros(best.size)
     for i, error in enumerate(errors):
         step = _STEP * error if np.isfinite(error) and error > 0 else 1e-6 * max(abs(best[i]), 1e-300)

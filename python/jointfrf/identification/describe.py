@@ -1,4 +1,4 @@
-"""What a reader must know of a fit: findings of every likelihood, and the result that holds them."""
+"""Findings of a fit for every likelihood, and the result that contains them."""
 
 from __future__ import annotations
 
@@ -35,49 +35,49 @@ from jointfrf.messages.message import Severity
 
 __all__ = ["describe_laws", "describe_model", "describe_springs", "poor_laws"]
 
-#: A parameter is called poorly determined when its interval is wider than this share of it on either side.
+#: Width of an interval, as a share of the value on either side, above which a parameter is poorly determined.
 _UNCERTAIN = 0.5
-#: One whose standard error is below this share is not: its interval need not be found.
+#: Relative standard error below which a parameter is not poorly determined, so that its interval need not be computed.
 _WELL = 0.1
-#: Correlations beyond this are named: an error of one is then mostly that of the other.
+#: Correlation above which findings name a pair: an error of one is then mostly an error of the other.
 _CORRELATED = 0.95
-#: Names shown of pairs, bands and channels.
+#: Number of pairs, bands and channels that findings name.
 _SHOWN = 4
-#: Probability by chance below which a scatter of parts of the band is named; above, it widens intervals only.
+#: Probability below which findings name a scatter of parts of the band; above, it only widens intervals.
 _BY_CHANCE = 1e-3
 #: Relative noise below this is rounding.
 _ROUNDING = 1e-7
-#: Intervals wider than this share of the value on either side are worth being narrowed.
+#: Width of an interval, as a share of the value on either side, above which findings say how to narrow it.
 _FLEXIBLE = 0.05
-#: Compliances below so many standard errors may be zero.
+#: Number of standard errors below which a compliance may be zero.
 _NEARLY_OPEN = 4.0
-#: What the width of an interval is due to, and what would make it smaller.
+#: Causes of a wide interval, and the remedy of each.
 _CURES = (
     ("sides", "give models of the sides (--side-j, --side-k; sides=), or measure nearer to the joint"),
     ("inertia", "give models of the sides (--side-j, --side-k; sides=), or measure at lower frequencies"),
-    ("noise", "take more averages, hits or lines"),
+    ("noise", "take more averages, impacts or lines"),
 )
-#: A reference point is proposed where it lowers the largest coupling to this share.
+#: Ratio of the largest coupling, after to before, below which a reference point is proposed.
 _LESS = 0.5
-#: FRFs of set-ups that differ from the mean by more than this part are in doubt: calibration leaves less, and where
-#: resonances have moved so far coverage falls (docs/accuracy.md).
+#: Relative deviation from the mean above which FRFs of a set-up are in doubt: calibration errors are smaller, and
+#: coverage falls if resonances have moved so far (docs/accuracy.md).
 _USUAL_GAIN = 0.05
-#: Degrees of freedom of a scatter of set-ups up to which Student's t widens intervals by more than a half.
+#: Degrees of freedom of a scatter of set-ups below which Student's t widens intervals by more than a half.
 _FEW_SETUPS = 3
-#: Share of lines that cannot fit the joint from which on a warning says so.
+#: Share of lines that cannot fit the joint above which a warning is issued.
 _UNTRUSTED = 0.02
-#: Share of a compliance by which it varies between lines from which on a warning says so.
+#: Relative variation of a compliance between lines above which a warning is issued.
 _VARIES = 0.05
-#: A residual so near to sqrt(2) times the noise given is that of noise given for each part.
+#: Relative distance of the residual from sqrt(2) times the given noise within which the noise was given for each part.
 _BY_PART = 0.03
-#: Correlation of neighbouring lines from which on they say noticeably less than independent ones.
+#: Correlation of neighbouring lines above which they have noticeably less information than independent ones.
 _INFLATED = 1.2
-#: A prior that the FRFs narrow by less than this is named: they say little of it.
+#: Ratio of posterior to prior standard deviation above which findings name a prior: the FRFs hardly narrow it.
 _UNCHANGED = 0.9
-#: -2 log evidence gained from which on errors of models are clear: 1 of 80 fits of right models has it by chance, as of
-#: half of chi-squared of one degree, since a level cannot be negative.
+#: Gain of -2 log evidence above which model errors are significant: 1 of 80 fits of right models exceeds it by chance,
+#: as half of chi-squared of one degree does, because a level cannot be negative.
 _CLEAR_GAIN = 5.0
-#: Another minimum whose -2 log likelihood is higher by less than this is named: odds of 1 to 150.
+#: Difference of -2 log likelihood below which findings name another minimum: odds of 1 to 150.
 _OTHER = 10.0
 
 
@@ -85,7 +85,7 @@ _OTHER = 10.0
 
 
 def describe_springs(found: ManifoldFit, problem: FitProblem) -> Fit:
-    """Make the result of a fit of springs and dampers."""
+    """Return the result of a fit of springs and dampers."""
     result, same = found.estimate, problem.options.same
     names, shared = _at_all_points([one.name for one in result.parameters], same, problem.dofs)
     fit = Fit.of_springs(
@@ -121,7 +121,7 @@ def describe_springs(found: ManifoldFit, problem: FitProblem) -> Fit:
         *_outlying_lines(problem),
         *_small_residual(found, problem),
         *_sides(problem),
-        *_seen(fit, intervals),
+        *_between_points(fit, intervals),
         *_groups([group.dofs for group in result.groups], fit.dofs, problem.options.cross),
         *_equal_points(same),
         *_hidden_lines(result, fit.dofs),
@@ -153,7 +153,7 @@ def _at_all_points(
 
 
 def _equal_points(same: Sequence[Sequence[str]]) -> list[Finding]:
-    """Say which points share their parameters."""
+    """Name the points that share their parameters."""
     return [Finding("equal-points", about=tuple(own)) for own in same]
 
 
@@ -219,7 +219,7 @@ def _named(group: NDArray[np.intp], dofs: tuple[str, ...]) -> str:
 
 
 def _choices(choices: Sequence[DofDamping]) -> list[Finding]:
-    """Say which damping terms were chosen for each DOF, and how clearly."""
+    """Name the damping terms that were chosen for each DOF, and how clear the choice is."""
     found = []
     for one in choices:
         if one.others:
@@ -239,7 +239,7 @@ def _reference_point(fit: Fit) -> list[Finding]:
     try:
         centre = elastic_centre(fit) if any(one.is_cross for one in fit.parameters) else None
     except ValueError:
-        # Names that give no direction, or a stiffness that is not positive: there is nothing to propose.
+        # DOF names without a direction, or a stiffness that is not positive: there is no proposal.
         centre = None
     if centre is None or centre.coupling > _LESS * centre.coupling_before:
         return []
@@ -253,7 +253,7 @@ def _reference_point(fit: Fit) -> list[Finding]:
 
 
 def _sides(problem: FitProblem) -> list[Finding]:
-    """Say what is known of sides that bend between channels and joint."""
+    """State the information on flexible sides between channels and joint."""
     frfs, added = problem.frfs, problem.added_compliance
     if problem.model_errors is not None:
         return [Finding("sides-corrected", {"errors": len(problem.model_errors)})]
@@ -266,8 +266,8 @@ def _sides(problem: FitProblem) -> list[Finding]:
     return [Finding("sides-flexible", {"values": values}, tuple(dof for dof, _ in known))]
 
 
-def _seen(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[Finding]:
-    """Say what the numbers are between virtual points on sides that may bend, and what would narrow the intervals."""
+def _between_points(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[Finding]:
+    """Explain numbers between virtual points on sides that may be flexible, and how to narrow the intervals."""
     if not fit.seen:
         return []
     found = [Finding("sides-removed")]
@@ -283,14 +283,14 @@ def _seen(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[Finding]:
 
 
 def _is_wide(low: float, high: float) -> bool:
-    """Whether an interval is worth being narrowed."""
+    """Return whether an interval should be narrowed."""
     return not high < (1 + _FLEXIBLE) / (1 - _FLEXIBLE) * low
 
 
 def _with_best_estimates(fit: Fit, result: JointEstimate) -> Fit:
     """Return the fit with a best estimate of each stiffness that may be infinite: by the median of 1/k >= 0.
 
-    Its error is that of the lower limit, by profile where noise is not normal in 1/k: the median lies above the limit.
+    Its error follows from the lower limit, by profile if noise is not normal in 1/k: the median is above the limit.
     """
     estimate, intervals = fit.estimate.copy(), None
     for group in result.groups:
@@ -322,7 +322,7 @@ def _hidden_lines(result: JointEstimate, dofs: tuple[str, ...]) -> list[Finding]
 
 
 def _unknown_cross(result: JointEstimate, dofs: tuple[str, ...], cross: CrossTerms) -> list[Finding]:
-    """Say what contradicts a joint where only the diagonal of its compliance was fitted."""
+    """Name contradictions to a joint of which only the diagonal of the compliance was fitted."""
     found = []
     for group in result.groups:
         beside = group.unknown_cross
@@ -343,7 +343,7 @@ def _unknown_cross(result: JointEstimate, dofs: tuple[str, ...], cross: CrossTer
 
 
 def _band_parts(found: ManifoldFit) -> list[Finding]:
-    """Name parameters on which parts of the band do not agree, each fitted by itself."""
+    """Name parameters on which separate fits of parts of the band disagree."""
     parts, findings = found.parts, list[Finding]()
     if parts is None or found.cross_fits:
         return []
@@ -370,14 +370,14 @@ def _scattering(fit: Fit, chances: FloatArray) -> list[Finding]:
 
 
 def _misfit(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
-    """Say whether the residual differs from the noise, and how."""
+    """State whether the residual differs from the noise, and how."""
     misfit, noise = found.test, problem.noise
     by_part = noise.is_given and abs(misfit.ratio / np.sqrt(2) - 1) < _BY_PART
     why = "coupled" if found.cross_fits else "per-part" if by_part else ""
-    # A fit without cross terms that ignored them has a finding of its own.
+    # A fit that ignored cross terms has a separate finding.
     is_told = found.cross_fits and any(group.unknown_cross is not None for group in found.estimate.groups)
     findings = [] if noise.is_assumed or is_told else _too_large(misfit, why)
-    # What the inertia of sides changes over frequency is in the intervals of the joint alone.
+    # Intervals of the joint alone cover the change over frequency by the inertia of sides.
     for trend in () if found.cross_fits or found.alone is not None else misfit.trends:
         low, high = trend.values.argmin(), trend.values.argmax()
         numbers = {
@@ -389,10 +389,10 @@ def _misfit(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
 
 
 def _small_residual(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
-    """Say that the residual is below the noise: intervals are then wider than they need be."""
+    """Report a residual below the noise: intervals are then wider than necessary."""
     misfit, noise = found.test, problem.noise
-    # What is not rigid in the channels weighs as noise, and averages out of a residual of joint DOFs.
-    # Nor does what set-ups have in common always leave a residual: gains of all forces of a side change the joint.
+    # Non-rigid motion of the channels counts as noise, but averages out of a residual of joint DOFs. Common errors of
+    # set-ups do not always leave a residual: equal gains of all forces of a side change the joint.
     of_setups = noise.calibration is not None and noise.calibration.setups is not None
     if noise.is_assumed or problem.sides_bend or of_setups or not misfit.is_small:
         return []
@@ -404,7 +404,7 @@ def _small_residual(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
 
 
 def describe_laws(found: ManifoldFit, joint: LawJoint) -> Fit:
-    """Make the result of a fit of laws to FRFs between all joint DOFs."""
+    """Return the result of a fit of laws to FRFs between all joint DOFs."""
     problem, result, same = found.problem, found.estimate, found.problem.options.same
     shared = parameters_shared(joint.names, same)
     intervals = found.intervals.shared(joint.names, shared) if same else found.intervals
@@ -459,7 +459,7 @@ def _law_trends(misfit: ResidualTest) -> list[Finding]:
 
 
 def describe_model(found: FoundModel, channels: Channels) -> Fit:
-    """Make the result of a fit of an assembly."""
+    """Return the result of a fit of an assembly."""
     problem, vector, test = found.problem, found.problem.vector, found.test
     whole = problem.prediction.whole
     shown = np.isfinite(problem.variance)
@@ -524,7 +524,7 @@ def describe_model(found: FoundModel, channels: Channels) -> Fit:
 
 
 def _model_residual(fit: Fit, found: FoundModel, channels: Channels) -> list[Finding]:
-    """Say that the model does not fit, and where."""
+    """Report that the model does not fit, with frequencies and channels."""
     test, findings = found.test, []
     if test.is_noise:
         return []
@@ -554,7 +554,7 @@ def _model_residual(fit: Fit, found: FoundModel, channels: Channels) -> list[Fin
 
 
 def _model_error(found: FoundModel) -> list[Finding]:
-    """Say which errors of the models, and of a gain of all FRFs, the intervals allow for."""
+    """Name the errors of models, and of a gain of all FRFs, that the intervals cover."""
     if found.error is None:
         return []
     own, left = found.error.model, found.test_with_error
@@ -585,9 +585,9 @@ def _model_gains(found: FoundModel, channels: Channels) -> list[Finding]:
             about.append(names[one.channel])
         who = f"{what} {names[one.channel]}" if names else "all FRFs"
         gains.append(f"{who} {one.value:.4g} +- {one.std:.1g}")
-    if not gains or found.test_with_error.is_large:  # of models that do not fit, gains are none
+    if not gains or found.test_with_error.is_large:  # if the models do not fit, their gains mean nothing
         return []
-    # As far off as sensors and hammers usually are, it is no reason to doubt the fit.
+    # Usual errors of sensors and hammers are no reason to doubt the fit.
     is_unusual = max(abs(one.value - 1) for one in found.gains) > float(ndtri(0.975)) * GAIN
     severity: Severity = "warning" if found.error_matters and is_unusual else "note"
     return [Finding("model-gain", {"gains": tuple(gains)}, tuple(about), severity=severity)]
@@ -638,7 +638,7 @@ def _coefficient(weight: float) -> str:
 
 
 def _groups_of_joints(found: FoundModel) -> list[Finding]:
-    """Say which joints are equal, and how far those that are alike scatter."""
+    """Name joints that are equal, and the scatter of similar joints."""
     vector, whole = found.problem.vector, found.problem.prediction.whole
     said = [Finding("equal-points", about=tuple(own)) for own in whole.same]
     for one in vector.means:
@@ -651,7 +651,7 @@ def _groups_of_joints(found: FoundModel) -> list[Finding]:
 
 
 def _directions(directions: Sequence[OpenDirection], said: Collection[str] = ()) -> list[Finding]:
-    """Say what the FRFs do not determine, by its direction, unless a prior does, or it is said already."""
+    """Name directions that the FRFs do not determine, unless a prior does or another finding names them."""
     return [
         Finding("direction-undetermined", {"direction": _direction(one)}, tuple(name for name, _ in one.parts))
         for one in directions
@@ -669,7 +669,7 @@ def _other_minimum(other: float) -> list[Finding]:
 
 
 def _priors(fit: Fit, directions: Sequence[OpenDirection], said: Collection[str]) -> list[Finding]:
-    """Name unknowns of which the FRFs say no more than the prior, and directions that priors hold."""
+    """Name unknowns and directions that only their priors determine."""
     errors = fit.std_error
     same = tuple(
         one.name for one in fit.parameters if one.prior is not None and errors[one.name] > _UNCHANGED * one.prior[1]
@@ -689,7 +689,7 @@ def _priors(fit: Fit, directions: Sequence[OpenDirection], said: Collection[str]
 
 
 def poor_laws(fit: Fit, is_log: dict[str, bool], limits: Callable[[str], tuple[float, float]]) -> list[Finding]:
-    """Name positive parameters of laws that the data determine poorly or not at all; `limits` are those of 95 %."""
+    """Name positive parameters of laws that the data determine poorly or not at all; `limits` gives 95 % intervals."""
     found, errors = [], fit.std_error
     for one in fit.parameters:
         value = fit.value[one.name]
@@ -718,7 +718,7 @@ def _correlated(fit: Fit) -> list[Finding]:
 
 
 def _noise(is_assumed: bool, inflation: float, freq_hz: FloatArray) -> list[Finding]:
-    """Say how the noise was found, and whether lines share it."""
+    """State the origin of the noise, and whether lines share it."""
     found = []
     if is_assumed:
         found.append(Finding("noise-from-residual"))
@@ -729,7 +729,7 @@ def _noise(is_assumed: bool, inflation: float, freq_hz: FloatArray) -> list[Find
 
 
 def _moving_mass(mass: MovingMass | None) -> list[Finding]:
-    """Return the mass of a sensor that was removed: given, or found."""
+    """Return the mass of a sensor that was removed: given, or estimated."""
     if mass is None:
         return []
     where = "excitation" if mass.with_force else "response"
@@ -742,7 +742,7 @@ def _moving_mass(mass: MovingMass | None) -> list[Finding]:
 
 
 def _calibration(errors: CalibrationErrors | None) -> list[Finding]:
-    """Say by how much h_pq and h_qp differ smoothly, and what intervals allow for."""
+    """State how far h_pq and h_qp differ smoothly, and the errors that intervals cover."""
     if errors is None:
         return []
     found, parts = [] if errors.setups is None else _setups(errors.setups), []
@@ -757,7 +757,7 @@ def _calibration(errors: CalibrationErrors | None) -> list[Finding]:
 
 
 def _setups(errors: SetUpErrors) -> list[Finding]:
-    """Name set-ups that disagree, and say what intervals allow for."""
+    """Name set-ups that disagree, and the errors that intervals cover."""
     found = []
     for one in errors.deviations:
         size, error, variant = one.size, one.error, one.part
@@ -790,12 +790,12 @@ def _outlying_lines(problem: FitProblem) -> list[Finding]:
 
 
 def _left_out_dofs(problem: FitProblem) -> list[Finding]:
-    """Name DOFs that are not sought, but enter those that are."""
+    """Name DOFs that were omitted but enter the result."""
     return [Finding("dof-left-out", {"reason": str(one)}, (one.dof,)) for one in problem.left_out if one.matters]
 
 
 def _left_out_lines(result: JointEstimate, dofs: tuple[str, ...], test: ResidualTest) -> list[Finding]:
-    """Count the lines that no joint near the one found fits."""
+    """Count the lines that no joint near the estimate fits."""
     found = []
     for group in result.groups:
         if group.unknown_cross is not None:
@@ -809,7 +809,7 @@ def _left_out_lines(result: JointEstimate, dofs: tuple[str, ...], test: Residual
 
 
 def _too_large(misfit: ResidualTest, why: str = "") -> list[Finding]:
-    """Say that the residual is more than noise, and by default where."""
+    """Report that the residual exceeds the noise, by default with frequencies and channels."""
     if not misfit.is_large:
         return []
     bands = tuple((low, high) for low, high, _ in misfit.local)

@@ -1,4 +1,4 @@
-"""Where a joint is most nearly diagonal: the elastic centre, and how far its stiffness is from diagonal there."""
+"""Elastic centre: the reference point at which the stiffness of a joint is most nearly diagonal."""
 
 from __future__ import annotations
 
@@ -14,27 +14,28 @@ from jointfrf.laws.law_joint import LawJoint
 
 __all__ = ["ElasticCentre", "elastic_centre"]
 
-#: Directions in which the coupling changes less than this share of the most, for the same offset, do not matter.
+#: Change of the coupling, relative to the largest for an offset of this length, below which a direction is ignored.
 _UNSEEN = 1e-6
-#: Coupling below this is not weighted further: a joint is hardly ever diagonal to more.
+#: Lower bound of the standard error of a coupling: a joint is hardly ever diagonal to more.
 _FLOOR = 0.01
 
 
 class ElasticCentre(NamedTuple):
-    """The reference point at which a joint is most nearly diagonal.
+    """Reference point at which a joint is most nearly diagonal.
 
     Attributes
     ----------
     offset : ndarray, shape (3,)
-        From the present reference points along x, y, z, m; 0 where nothing depends on it.
+        Vector from the present reference points along x, y, z, m; 0 along directions without effect.
     std_error : ndarray, shape (3,)
-        From the covariance of the stiffness, m; 0 without one, inf along directions on which nothing depends.
+        Standard error from the covariance of the stiffness, m; 0 without a covariance, inf along directions without
+        effect.
     covariance : ndarray, shape (3, 3)
-        Of the offset, m^2, along directions on which something depends.
+        Covariance of the offset, m^2, along directions that have an effect.
     coupling_before, coupling : float
-        Largest |K_ab| / sqrt(K_aa K_bb) between two DOFs at the present point and there.
+        Largest |K_ab| / sqrt(K_aa K_bb) between two DOFs at the present point and at the new point.
     joint : Joint
-        The joint there, see `Joint.moved`.
+        Joint at the new point, see `Joint.moved`.
     """
 
     offset: FloatArray
@@ -51,12 +52,13 @@ def elastic_centre(joint: Joint | Fit) -> ElasticCentre:
     Parameters
     ----------
     joint : Joint or Fit
-        With its full stiffness: a fit with ``cross="fit"``. Of a fit, coupling that is poorly known counts less, and
-        the offset has a standard error.
+        Joint with its full stiffness, or a fit with ``cross="fit"``. A fit gives the offset a standard error, and
+        imprecise cross terms get less weight.
 
     Returns
     -------
     ElasticCentre
+        Offset with its standard error, coupling before and after, and the joint at the new point.
 
     Raises
     ------
@@ -64,12 +66,17 @@ def elastic_centre(joint: Joint | Fit) -> ElasticCentre:
         No translation and rotation together, names of DOFs without a direction, a stiffness that is not
         positive on the diagonal.
 
+    See Also
+    --------
+    Joint.moved : the joint at another reference point.
+    identify : fit of a joint with its cross terms.
+
     Notes
     -----
-    The sum of the squares K_ab^2 / (K_aa K_bb) over pairs of DOFs is minimised over the offset r of K moved by it,
-    T^-T K T^-1. Only terms between translations and rotations, and those between rotations, depend on it. For a joint
-    that is diagonal somewhere this is the centre of stiffness and of compliance; else the best compromise. The
-    covariance of r is that of K through the implicit derivative of the minimum.
+    The function minimises the sum of K_ab^2 / (K_aa K_bb) over pairs of DOFs. Moving the reference point by r gives
+    the stiffness T^-T K T^-1. Only coupling of translations with rotations and between rotations depends on r. If the
+    joint is diagonal at some point, this point is the centre of stiffness and of compliance; otherwise it is the best
+    compromise. The covariance of r follows from the covariance of K by the implicit derivative of the minimum.
 
     References
     ----------
@@ -96,7 +103,7 @@ def elastic_centre(joint: Joint | Fit) -> ElasticCentre:
     if not (diagonal > 0).all():
         bad = int(np.argmin(diagonal))
         raise ValueError(f"joint: the stiffness of {joint.dofs[bad]} must be positive, not {diagonal[bad]:g}")
-    return _found(_Coupling(joint, covariance))
+    return _minimised(_Coupling(joint, covariance))
 
 
 def _stiffness_covariance(fit: Fit) -> FloatArray:
@@ -117,7 +124,7 @@ class _Coupling:
     def __init__(self, joint: Joint, covariance: FloatArray | None) -> None:
         self.joint, self.covariance = joint, covariance
         self.rows, self.columns = np.triu_indices(len(joint.dofs), 1)
-        # Rotations in units in which the stiffness of a rotation is that of a translation.
+        # Units of rotations in which their stiffness equals the stiffness of a translation.
         turns = np.array([is_rotation(dof) for dof in joint.dofs])
         k = np.diagonal(joint.stiffness)
         self.length = float(np.sqrt(np.median(k[turns]) / np.median(k[~turns])))
@@ -169,7 +176,7 @@ class _Coupling:
         return slope
 
     def offset_covariance(self, offset: FloatArray, jacobian: FloatArray, seen: FloatArray) -> FloatArray:
-        """Return the covariance of the offset from that of the stiffness."""
+        """Return the covariance of the offset, from the covariance of the stiffness."""
         if self.covariance is None:
             return np.zeros((3, 3))
         to_offset = -self.length * seen @ np.linalg.pinv(jacobian @ seen) * self.weight
@@ -178,14 +185,14 @@ class _Coupling:
         return found
 
 
-def _found(coupling: _Coupling) -> ElasticCentre:
-    """Minimise the coupling from the present point, and from where its linear part vanishes."""
+def _minimised(coupling: _Coupling) -> ElasticCentre:
+    """Minimise the coupling from the present point, and from the zero of its linear part."""
     from scipy import optimize
 
     start = optimize.least_squares(coupling.weighted, np.zeros(3), xtol=1e-14, ftol=1e-14, gtol=1e-14)
     linear = optimize.least_squares(coupling.weighted, coupling.linear(), xtol=1e-14, ftol=1e-14, gtol=1e-14)
     best = min((start, linear), key=lambda one: one.cost)
-    jacobian = _slope(coupling, best.x)
+    jacobian = _jacobian(coupling, best.x)
     _, size, right = np.linalg.svd(jacobian, full_matrices=True)
     size = np.pad(size, (0, 3 - size.size))
     is_seen = size > _UNSEEN * max(size[0], np.finfo(float).tiny)
@@ -198,7 +205,7 @@ def _found(coupling: _Coupling) -> ElasticCentre:
     return ElasticCentre(offset, error, covariance, before, after, coupling.joint.moved(offset))
 
 
-def _slope(coupling: _Coupling, at: FloatArray) -> FloatArray:
+def _jacobian(coupling: _Coupling, at: FloatArray) -> FloatArray:
     """Return the derivatives of the weighted coupling by the scaled offset, shape (pairs, 3)."""
     steps = 1e-6 * np.eye(3)
     slope: FloatArray = np.stack(

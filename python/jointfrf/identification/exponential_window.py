@@ -1,4 +1,4 @@
-"""Exponential windows: what they add to a joint, and how one that was not stated shows."""
+"""Exponential windows: their effect on a joint, and signs of a window that was not stated."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from jointfrf.messages.finding import Finding
 
 __all__ = ["unstated_window", "without_window"]
 
-#: Lines from which on two terms and their scatter are compared.
+#: Number of lines from which on the two terms and their scatter are compared.
 _LEAST_LINES = 10
 
 
@@ -28,15 +28,15 @@ def without_window(fit: Fit, decay: float) -> Fit:
     Parameters
     ----------
     fit : Fit
-        Of springs and dampers, with its likelihood.
+        Fit of springs and dampers, with its likelihood.
     decay : float
-        1/s.
+        Decay rate of the window, 1/s.
 
     Notes
     -----
-    The window shifts the frequency of a linear structure: the FRFs are those at s = i w + decay. K* = k + s c is then
-    fitted as a stiffness k + decay c, and as c. A stiffness seen between virtual points has c times the square of its
-    share in the stiffness of the joint alone.
+    The window shifts the frequency of a linear structure: the FRFs are taken at s = i w + decay. The fit of
+    K* = k + s c then gives a stiffness k + decay c, and c. For a stiffness between virtual points, c is multiplied by
+    the square of its share in the stiffness of the joint alone.
     """
     place = {(one.kind, one.row, one.column): i for i, one in enumerate(fit.parameters)}
     back = np.eye(len(fit.parameters))
@@ -60,13 +60,13 @@ def without_window(fit: Fit, decay: float) -> Fit:
     return replace(
         fit, estimate=estimate, covariance=covariance, k_lines=k_lines,
         intervals=_intervals(own, fit.covariance, covariance, back, moved),
-        seen={name: _moved(one, _seen_shift(fit, name, one, moved)) for name, one in fit.seen.items()},
+        seen={name: _moved(one, _shift_between_points(fit, name, one, moved)) for name, one in fit.seen.items()},
         findings=(*fit.findings, removed),
     )  # fmt: skip
 
 
 def _intervals(own: Intervals, before: FloatArray, after: FloatArray, back: FloatArray, moved: FloatArray) -> Intervals:
-    """Return the intervals of parameters that are `back` times others; where no profile has them by their variances."""
+    """Return the intervals of parameters that are `back` times others; from their variances without a profile."""
 
     def limits(i: int, probability: float) -> tuple[float, float]:
         used = np.flatnonzero(back[i])
@@ -88,8 +88,8 @@ def _intervals(own: Intervals, before: FloatArray, after: FloatArray, back: Floa
     return Intervals(own.names, limits, of_function)
 
 
-def _seen_shift(fit: Fit, name: str, one: SeenStiffness, moved: FloatArray) -> float:
-    """Return by how much the window moved a stiffness seen between virtual points."""
+def _shift_between_points(fit: Fit, name: str, one: SeenStiffness, moved: FloatArray) -> float:
+    """Return the shift by the window of a stiffness between virtual points."""
     place = [each.name for each in fit.parameters].index(name)
     share = one.value / float(fit.estimate[place])
     return float(moved[place]) * share**2 if np.isfinite(share) else 0.0
@@ -100,12 +100,12 @@ def _moved(one: SeenStiffness, shift: float) -> SeenStiffness:
 
 
 def unstated_window(fit: Fit) -> list[Finding]:
-    """Name an exponential window that would explain hysteretic damping which falls like 1/w.
+    """Return a finding if an exponential window would explain hysteretic damping that falls like 1/w.
 
     Notes
     -----
     Under a window exp(-sigma t) an accelerance is s^2 times the receptance at s = i w + sigma. Divided by (i w)^2
-    instead of s^2 it gives K* (i w / s)^2, about k (1 + 2 i sigma / w); a mobility gives half of that. Im K* of the
+    instead of s^2 it gives K* (i w / s)^2, about k (1 + 2 i sigma / w); a mobility gives half of this. Im K* of the
     lines, weighted by their information on h, is fitted as h + w c and as b / w + w c. Both have two terms: n lines
     prefer the second by a Bayesian information criterion that is lower by n ln(squares / squares).
     """

@@ -1,4 +1,4 @@
-"""A joint found as input of a finite-element program, with what each number is worth."""
+"""Input of a finite-element program for the identified joint, with the uncertainty of each number."""
 
 from __future__ import annotations
 
@@ -32,23 +32,29 @@ def cards(
     freq_hz: float | None = None,
     **options: Unpack[CardOptions],
 ) -> str:
-    """Write the joint found as input of a finite-element program, with comments on what each number is worth.
+    """Return the identified joint as input of a finite-element program, with comments on each uncertainty.
 
     Parameters
     ----------
     fit : Fit
-    program, nodes, **options
-        As in `Joint.export`. Of a fit of several joint points, a mapping from each of them to its nodes, in CalculiX
-        followed by its two rotation nodes; numbers of elements and properties go on from point to point.
+        Fit of springs and dampers, or of laws.
+    program : str
+        Name of the program; see `Joint.export`.
+    nodes : sequence of int, or mapping of str to these
+        Nodes of the joint; see `Joint.export`. For a fit of several joint points, a mapping from each point to its
+        nodes, in CalculiX followed by its two rotation nodes. Numbers of elements and properties continue from point
+        to point.
     about : sequence of str
-        Where the fit comes from: first lines of comment.
+        Origin of the fit, written as the first lines of comment; none by default.
     all_damping : bool
-        Of springs and dampers also damping that is negative or not significantly above zero (95 %), which is left out
-        otherwise, with the cross terms of its DOF.
+        Whether to write damping of springs and dampers that is negative or not significantly above zero (95 %). By
+        default it is omitted, together with the cross terms of its DOF.
     bounds : bool
-        Also stiffnesses of which only a bound is known, by their best estimate; an error otherwise.
+        Whether to write the best estimate of a stiffness that has only a bound. By default this is an error.
     freq_hz : float, optional
-        Where laws are taken that depend on frequency, as in `LawJoint.export`.
+        Frequency at which laws are evaluated, Hz; see `LawJoint.export`.
+    **options
+        Further options of `Joint.export`.
 
     Returns
     -------
@@ -58,13 +64,28 @@ def cards(
     Raises
     ------
     ValueError
-        As `Joint.export` and `LawJoint.export`; a stiffness is infinite, or only a bound of it is known.
+        An error of `Joint.export` or `LawJoint.export`; a stiffness is infinite, or has only a bound.
+
+    See Also
+    --------
+    Joint.export : the same without a fit.
+    write_joint : a joint as a TOML file.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> freq = np.linspace(0.5, 10, 400)
+    >>> h = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start").receptance(freq)[:, 1:, 1:]
+    >>> gamma = jf.couple(h, h, jf.Joint([2000.0], [3.0]).dynamic_stiffness(freq), [0], [0])
+    >>> fit = jf.identify(freq, jf.pollute(gamma, 0.01, seed=1), dofs=["x"])
+    >>> "CBUSH" in jf.cards(fit, "nastran", (101, 102))
+    True
     """
     check_type("fit", fit, Fit)
     if fit.points or isinstance(nodes, Mapping):
         return "".join(_cards_of_points(fit, program, nodes, about, options, all_damping, bounds, freq_hz))
     intervals = fit.confidence_interval(0.95)
-    dropped = _worthless(fit, intervals) if fit.laws is None and not all_damping else set()
+    dropped = _insignificant(fit, intervals) if fit.laws is None and not all_damping else set()
     _check_finite(fit)
     if not bounds:
         _check_known(fit, intervals)
@@ -72,7 +93,11 @@ def cards(
         *about,
         f"method {fit.method}, {fit.freq_hz.min():g} to {fit.freq_hz.max():g} Hz, {fit.freq_hz.size} lines; value, "
         "95 % interval, unit:",
-        *(_worth(fit, one, intervals[one.name], one in dropped) for one in fit.parameters if one.origin == "joint"),
+        *(
+            _uncertainty(fit, one, intervals[one.name], one in dropped)
+            for one in fit.parameters
+            if one.origin == "joint"
+        ),
         *(f"warning: {warning}" for warning in fit.warnings),
     ]
     if fit.laws is not None:
@@ -116,7 +141,7 @@ def _cards_of_points(
             fit.at_point(point), program, ends[:2], about=[*about, f"joint point {point}"], all_damping=all_damping,
             bounds=bounds, freq_hz=freq_hz, **own,
         )  # fmt: skip
-        # Beyond every element and property that these lines name.
+        # Numbers above all elements and properties in these lines.
         element, number = element + len(text.splitlines()), number + len(text.splitlines())
         auxiliary = None if auxiliary is None else auxiliary + len(text.splitlines())
         sets += [own["number"]] if "\nMPC*" in text else []
@@ -128,7 +153,7 @@ def _cards_of_points(
         yield "\n".join(("MPCADD  " if i == 0 else " " * 8) + "".join(row) for i, row in enumerate(rows)) + "\n"
 
 
-def _worthless(fit: Fit, intervals: dict[str, tuple[float, float]]) -> set[FittedParameter]:
+def _insignificant(fit: Fit, intervals: dict[str, tuple[float, float]]) -> set[FittedParameter]:
     """Return the damping of DOFs that is not significantly above zero, with the cross terms of these DOFs."""
     bad = {
         term
@@ -143,13 +168,13 @@ def _check_finite(fit: Fit) -> None:
     for name, value in fit.value.items():
         if not np.isfinite(value):
             raise ValueError(
-                f"{name} cannot be distinguished from a rigid connection; connect this DOF rigidly, and fit the others "
+                f"{name} cannot be distinguished from a rigid connection; connect this DOF rigidly, and fit the joint "
                 "without it"
             )
 
 
 def _check_known(fit: Fit, intervals: dict[str, tuple[float, float]]) -> None:
-    """Raise an error where only a bound of a stiffness is known."""
+    """Raise an error if a stiffness has only a bound."""
     names = [
         one.name
         for one in fit.parameters
@@ -162,8 +187,8 @@ def _check_known(fit: Fit, intervals: dict[str, tuple[float, float]]) -> None:
         )
 
 
-def _worth(fit: Fit, term: FittedParameter, interval: tuple[float, float], is_dropped: bool) -> str:
-    """Say in one line what a parameter is worth."""
+def _uncertainty(fit: Fit, term: FittedParameter, interval: tuple[float, float], is_dropped: bool) -> str:
+    """Return one line on the uncertainty of a parameter."""
     low, high = interval
     text = f"{term.name} = {fit.value[term.name]:.5g}, {low:.4g} .. {high:.4g} {term.unit}"
     if term.kind == "k" and not term.is_cross and not np.isfinite(high):
@@ -179,7 +204,7 @@ def _worth(fit: Fit, term: FittedParameter, interval: tuple[float, float], is_dr
 
 
 def _active(joint: Joint) -> list[str]:
-    """Warn of damping that puts power into the model in some motion."""
+    """Return a warning about damping that puts power into the model in some motion."""
     found = []
     for what, matrix in (("viscous", joint.damping), ("hysteretic", joint.structural_damping)):
         root = np.sqrt(abs(matrix.diagonal()))

@@ -1,4 +1,4 @@
-"""What a fit was made from, kept by reference for those who want to look at it: FRFs, noise, what each line says."""
+"""Data behind a fit, kept by reference for figures: FRFs, noise, and the contribution of each line."""
 
 from __future__ import annotations
 
@@ -30,35 +30,39 @@ class FitData:
     response_names, force_names : tuple of str
         Names of the channels.
     responses, forces : ndarray, shapes (2 n, m_r), (2 n, m_f)
-        From channels to joint DOFs j, then k.
+        Matrices from channels to joint DOFs j, then k.
     modes : tuple of ndarray, shapes (m_r, 2 n) and (m_f, 2 n), or None
-        Motion of the channels for a unit of each joint DOF where the sides are rigid; None where it is not known.
+        Motion of the channels for a unit of each joint DOF if the sides are rigid; None if it is not known.
     interface : Interface or None
-        Geometry of the channels, where it is known.
+        Geometry of the channels, if known.
     reciprocal : bool
         Whether h_pq and h_qp are the same FRF.
     variance : ndarray, shape (n_freq, m_r, m_f)
-        E|e|^2 of the noise as it weighs in the fit, (m/N)^2: `variance_scale` times this is that of the noise found.
+        Noise variance E|e|^2 that defines the weights of the fit, (m/N)^2. The estimated noise variance is
+        `variance_scale` times this.
     variance_scale : float
+        Ratio of estimated noise variance to `variance`.
     deformation : ndarray, shape (n_freq, m_r, m_f), or None
-        Part of the variance that is not noise: squares of what is not rigid in the channels, (m/N)^2.
+        Part of the variance that is not noise but non-rigid motion of the channels, (m/N)^2.
     noise : NoiseModel or None
-        Where the noise was found from the FRFs, and these are not too many.
+        Noise model, if it was estimated from the FRFs and is not too large to keep.
     fitted : ndarray of bool, shape (n_freq, n)
         Lines used for each DOF: inside its bands, and fitting a joint within their noise.
     regenerated : callable
-        From a slice of the lines to the FRFs between the joint DOFs, shape (lines, 2 n, 2 n), m/N: nearest to the
-        measured ones among all that fit the joint found. NaN where there are none.
+        Function from a slice of the lines to FRFs between the joint DOFs, m/N, shape (lines, 2 n, 2 n). They fit the
+        identified joint and are nearest to the measured FRFs. NaN if there are none.
     line_compliance : callable
-        Returns the diagonal of the joint's compliance C by line, shape (n_freq, n), m/N, as the fit sees it: linearised
-        at FRFs that fit the joint, so without the bias of an inverse of noise. NaN where a line does not give it.
+        Function that returns the diagonal of the joint compliance C by line, shape (n_freq, n), m/N. It is linearised
+        at FRFs that fit the joint, so it lacks the bias of an inverse of noise. NaN if a line does not determine it.
     information : callable
-        Returns the share of each line in what is known of each parameter, shape (n_freq, p).
+        Function that returns the share of each line in the information on each parameter, shape (n_freq, p).
     hidden_errors : callable
-        Returns the change of each parameter, by its name, by errors that no FRF shows: ``"delay"``, 1 us of all forces;
-        ``"resonance"``, sensors that all resonate at ten times the highest line; ``"force-noise"``, 1 % of noise in the
-        power of the force, with H1; ``"position"``, positions of channels of standard deviation 1 mm, if an `Interface`
-        states them.
+        Function that returns the change of each parameter, by its name, for errors that no FRF shows:
+
+        - ``"delay"``: a delay of 1 us of all forces
+        - ``"resonance"``: a resonance of all sensors at ten times the highest line
+        - ``"force-noise"``: 1 % of noise in the power of the force, with H1
+        - ``"position"``: channel positions with a standard deviation of 1 mm, if an `Interface` states them
     """
 
     measured: ComplexArray
@@ -80,7 +84,7 @@ class FitData:
     hidden_errors: Callable[[], Mapping[str, Mapping[str, float]]]
 
     def noise_variance(self, lines: slice) -> FloatArray:
-        """Return E|e|^2 of the noise found on some lines, shape (lines, m_r, m_f); inf where an FRF is not used."""
+        """Return the estimated E|e|^2 on some lines, shape (lines, m_r, m_f); inf if an FRF is not used."""
         own: FloatArray = self.variance[lines]
         if self.deformation is not None:
             with np.errstate(invalid="ignore"):
@@ -90,27 +94,27 @@ class FitData:
 
 @dataclass(frozen=True, eq=False)
 class ModelData:
-    """Measured FRFs behind a fit of an assembly, and what the models make of them; nothing is copied.
+    """Measured FRFs behind a fit of an assembly, and the FRFs of the models; nothing is copied.
 
     Attributes
     ----------
     assembly : Assembly
-        What was fitted.
+        Fitted assembly.
     measured : ndarray, shape (n_freq, n_o, n_i)
-        m/N; NaN where nothing was measured.
+        Measured FRFs, m/N; NaN if not measured.
     variance : ndarray, shape (n_freq, n_o, n_i)
-        E|e|^2 of the noise, (m/N)^2; inf where nothing was measured.
+        Noise variance E|e|^2, (m/N)^2; inf if not measured.
     predicted : ndarray, shape (n_freq, n_o, n_i)
-        FRFs of the assembly found, m/N.
+        FRFs of the fitted assembly, m/N.
     residual : ndarray, shape (n_freq, n_o, n_i)
-        Measured minus predicted over the standard deviation of the noise; NaN where nothing was measured.
+        Measured minus predicted FRFs over the standard deviation of the noise; NaN if not measured.
     open_directions : tuple of OpenDirection
         Combinations of parameters that the FRFs do not determine.
     next_channels : callable
-        Returns the channels, not measured yet, that would narrow the widest interval of the joint most, best first; the
-        models are reduced again for them.
+        Function that returns the channels, not measured yet, that would narrow the widest interval of the joint most,
+        best first. It reduces the models again for these channels.
     joint_motion : FoundMotion
-        Returns how the joint moves on each line, and what each line adds to the fit; fits another joint.
+        Function that returns the motion of the joint and the contribution to the fit on each line; fits another joint.
     """
 
     assembly: Assembly

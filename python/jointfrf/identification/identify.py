@@ -65,66 +65,70 @@ def identify(
     Parameters
     ----------
     freq_hz : array_like, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     gamma : array_like, shape (n_freq, 2 n, 2 n), or (n_freq, m_r, m_f) with `transform`
-        Measured receptances, m/N: at joint DOFs j, then k; or at the points that `transform` takes there.
+        Measured receptances, m/N, at joint DOFs j, then k, or at the channels of `transform`.
     dofs : sequence of str, optional
-        Names of the n joint DOFs; names beginning with theta, rx, ry, rz are rotations. ``"0"``, ``"1"``, ... by
-        default. Of several points at once, point and DOF: ``"bolt1.y"``, whose parameters are then ``"bolt1.k_y"``.
+        Names of the n joint DOFs, default ``"0"``, ``"1"``, ...; names that begin with theta, rx, ry, rz are rotations.
+        For several points the names have point and DOF: ``"bolt1.y"``, with parameters ``"bolt1.k_y"``.
     bands : None, (low, high), sequence of these, or mapping of DOF name to these, optional
-        Sensitive bands in Hz; all lines by default: each is weighted by its information, so that none are needed.
+        Sensitive bands, Hz; all lines by default. Bands are not needed, because each line is weighted by its
+        information.
     transform : array_like, shape (2 n, m), or Interface, or a pair of these, optional
-        From channels to joint DOFs j, then k: finite differences, virtual points. Noise is then taken as independent
-        between the channels, not between the transformed FRFs. A pair, for responses and for forces, of shapes
-        (2 n, m_r) and (2 n, m_f). An `Interface`, as `interface` and `virtual_interface` make it, has the geometry of
-        the channels: DOFs left out that enter those sought are then named, and intervals widened by what is not rigid
-        between the channels; of a plain matrix the latter where the channels move as those of which it is the
-        least-squares inverse.
+        Matrix from channels to joint DOFs j, then k: finite differences, virtual points. A pair has one matrix for
+        responses and one for forces, of shapes (2 n, m_r) and (2 n, m_f). Noise is then independent between channels.
+        An `Interface` from `interface` or `virtual_interface` has the geometry of the channels. With it, findings name
+        omitted DOFs that enter the result, and intervals cover non-rigid motion between the channels; with a plain
+        matrix they do so only if the channels move as its pseudo-inverse predicts.
     joint : LawJoint, optional
-        Laws to fit, with rigid DOFs and cross terms; its values are where the fit may start. Masses need models:
-        `identify_model`. By default springs and dampers, as `damping` and `cross` say, short forms of a joint of
-        `SpringLaw`.
+        Laws to fit, with rigid DOFs and cross terms; its parameters are initial values. By default springs and dampers
+        according to `damping` and `cross`, as in a joint of `SpringLaw`. Masses need models: `identify_model`.
     damping : {"auto", "viscous", "hysteretic", "both", "none"}, or a sequence of these, one for each DOF
-        Terms of K* = k (1 + i eta) + i w c to fit. "auto" chooses for each DOF by the Bayesian information criterion,
-        two terms with a margin of 6; values are means over the kinds that the data do not exclude, and intervals hold
-        those of all. With `cross` "points" or "fit", and with `same`, it chooses for all DOFs together. The default.
+        Terms of K* = k (1 + i eta) + i w c to fit. The default "auto" chooses for each DOF by the Bayesian information
+        criterion, two terms with a margin of 6. Values are then means over the kinds that the data do not exclude, and
+        intervals cover all these kinds. With `cross` "points" or "fit", and with `same`, one choice is made for all
+        DOFs.
     cross : {"zero", "ignore", "points", "fit"}
-        Terms that couple the DOFs of the joint: none (the default), and this is used; unknown and not fitted; fitted
-        between the DOFs of each point, so that K* is a block for each, and none between points; fitted, symmetric.
-        If they are unknown, k is 1/C_dd of the compliance.
+        Terms that couple the DOFs of the joint, default "zero":
+
+        - "zero": no cross terms, which the fit uses
+        - "ignore": unknown cross terms, not fitted; k is then 1/C_dd of the compliance
+        - "points": symmetric cross terms between the DOFs of each point, none between points
+        - "fit": symmetric cross terms between all DOFs
     same : sequence of str, or sequence of these, optional
-        Points whose joints are equal, ``["bolt1", "bolt2"]``: they share all parameters, which are named at each.
+        Points with equal joints, ``["bolt1", "bolt2"]``: they share all parameters, which are listed for each point.
     noise : float, StatedNoise or array_like, shape (n_freq, m_r, m_f), optional
         Relative noise level of each entry, 0.01 for 1 %, sqrt(E|e|^2) of real and imaginary part together; or relative
-        part and floors; or the variance E|e|^2 of each, (m/N)^2. With `transform`, of each channel. By default it is
-        estimated by entry and frequency, as `estimate_noise` does.
+        part and floors; or the variance E|e|^2 of each channel, (m/N)^2. By default it is estimated by entry and
+        frequency, see `estimate_noise`.
     coherence, averages : optional
-        As in `estimate_noise`, where `noise` is not given.
+        Coherence and number of averages of the FRFs if `noise` is not given; see `estimate_noise`.
     setups : SetUps, optional
-        Which FRF came from which set-up of the test, as `FrfSet.setups_between` returns it: what the FRFs of a set-up
-        have in common, and what all have, is in the intervals, and set-ups that disagree are named in the findings.
+        Set-up of the test of each FRF, from `FrfSet.setups_between`. Intervals cover errors common to the FRFs of a
+        set-up and errors common to all FRFs; findings name set-ups that disagree.
     reciprocal : bool
-        Whether the structure is reciprocal, so that gamma_pq and gamma_qp may be averaged.
+        Whether the structure is reciprocal, so that gamma_pq and gamma_qp may be averaged; default True.
     sensor_mass : float, optional
-        Mass of the accelerometer that moves from point to point, kg. By default it is found from h_pq - h_qp, if
-        responses and forces are translations at the same points, and removed with a warning; 0 if no mass moves.
+        Mass of the accelerometer that moves from point to point, kg; 0 if no mass moves. If responses and forces are
+        translations at the same points, the default is an estimate from h_pq - h_qp, which is removed with a warning.
     window_decay : float
         Decay sigma of an exponential window exp(-sigma t) on the responses, 1/s, default 0. The receptances must be
         those at s = i w + sigma: divide an accelerance by s^2 and a mobility by s (`FrfSet.receptance`). Stiffnesses of
         springs are larger there by sigma c, which is subtracted.
     position_error : float
         Standard deviation of the position of each channel along each axis, m, default 0. Intervals of rotations cover
-        it. Needs an `Interface`; FRFs do not show such errors if the points of a side determine its motion exactly.
+        it. It needs an `Interface`; FRFs do not show such errors if the points of a side determine its motion exactly.
     sides : pair of SideModel, optional
-        Models of both sides j and k, free of each other, that bend between channels and joint: the FRFs are corrected
-        by them first, and what is not known of the models is in weights and intervals.
+        Models of the free sides j and k, which are flexible between channels and joint. The FRFs are first corrected by
+        them; weights and intervals cover the uncertainty of the models.
     accept : sequence of str
-        Codes of errors of the data at which the fit does not stop: "quantity", "driving-point-sign", ...; none by
+        Codes of data errors at which the fit does not stop, such as "quantity" or "driving-point-sign"; none by
         default.
 
     Returns
     -------
     Fit
+        Parameters of the joint with intervals, findings, and the test of the residual.
 
     Raises
     ------
@@ -140,16 +144,22 @@ def identify(
     ConvergenceWarning
         The fit did not converge.
     FrfCheckWarning
-        The FRFs look wrong (`check_frfs`): gain, delay, a dead or doubled channel, amplitude dependence; only the last
-        is checked if the structure is not reciprocal.
+        The FRFs look wrong (`check_frfs`): gain, delay, a dead or doubled channel, amplitude dependence; only amplitude
+        dependence is checked if the structure is not reciprocal.
+
+    See Also
+    --------
+    identify_model : fit of any FRFs of an assembly, with models of the parts.
+    identify_realisations : the same fit of many sets of FRFs.
+    check_frfs : data check of the FRFs.
 
     Notes
     -----
-    Maximum likelihood, linearised at the smooth FRFs, on the manifold of FRFs that fit a joint: regular for stiff
-    joints and on lines where gamma_jk is singular. Standard errors: inverse information of the noise, times the
-    correlation between lines, times the residual over the noise where it is above 1; the scatter between lines, or
-    between ten parts of the band, replaces that where it exceeds it by more than chance. Intervals by the profile of
-    the likelihood where they are not symmetric. DOFs that may be free are fitted in k, h and c instead of 1/k.
+    Maximum likelihood, linearised at the smooth FRFs, on the manifold of FRFs that fit a joint. This is regular for
+    stiff joints and on lines at which gamma_jk is singular. The standard error is the inverse information of the noise,
+    multiplied by the correlation between lines and by the ratio of residual to noise if it is above 1. The scatter
+    between lines, or between ten parts of the band, replaces it if it exceeds it by more than chance. Asymmetric
+    intervals follow from the profile of the likelihood. DOFs that may be free are fitted in k, h and c instead of 1/k.
 
     Examples
     --------
@@ -196,9 +206,9 @@ def identify(
     )  # fmt: skip
     problem = prepare_compliance(*arguments)
     accepted = as_accepted(accept)
-    # Models of sides have corrected the FRFs of the problem.
+    # Models of the sides have corrected the FRFs of the problem.
     raw = None if sides is None else measured.h[np.isin(measured.freq_hz, problem.freq_hz)]
-    of_data = _look_at(problem, transform, raw)
+    of_data = _data_checks(problem, transform, raw)
     stop_at_errors(of_data, accepted)
     if any(one.code == "amplitude-dependent" for one in of_data):
         if problem.noise.cross_axis is not None:
@@ -249,7 +259,7 @@ def _check_sides(sides: tuple[SideModel, SideModel] | None) -> tuple[SideModel, 
     return sides[0], sides[1]
 
 
-def _look_at(
+def _data_checks(
     problem: FitProblem, transform: Transform | tuple[Transform, Transform] | None, raw: ComplexArray | None
 ) -> list[Finding]:
     """Return errors and warnings of the FRFs; amplitude dependence of `raw` ones if models corrected them."""
@@ -263,7 +273,7 @@ def _look_at(
         check = _checked(MeasuredFrfs(problem.freq_hz, problem.frfs.measured), problem.dofs, transforms)
         found = [one for one in check.findings if one.severity != "note"]
         if transforms is not None:
-            # DOFs of virtual points on flexible sides need not be passive, nor have the sign of a driving point.
+            # DOFs of virtual points on flexible sides may be active, or have another sign than a driving point.
             found = [replace(one, severity="warning") if one.severity == "error" else one for one in found]
         if raw is None and all(one.code != "amplitude-dependent" for one in found):
             return found
@@ -275,8 +285,8 @@ def _look_at(
 def _checked(
     measured: MeasuredFrfs, dofs: tuple[str, ...], transforms: tuple[FloatArray, FloatArray] | None
 ) -> FrfCheck:
-    """Look at the FRFs of the lines used, by the names of the joint DOFs where these are the channels."""
-    # A look at some lines, evenly spread, shows as much.
+    """Check the FRFs of the lines used; messages have the names of the joint DOFs if these are the channels."""
+    # Some evenly spaced lines are sufficient.
     some = spread_lines(measured.freq_hz.size)
     freq, h = measured.freq_hz[some], measured.h[some]
     if transforms is None:
@@ -295,7 +305,7 @@ def _check_law_joint(joint: LawJoint, dofs: Sequence[str] | None) -> LawJoint:
     check_type("joint", joint, LawJoint)
     names = joint.dofs if dofs is None else as_names("dofs", dofs)
     if sorted(names) != sorted(joint.dofs):
-        raise ValueError(f"dofs must name those of joint, {', '.join(joint.dofs)}, not {', '.join(names)}")
+        raise ValueError(f"dofs must be the DOFs of joint, {', '.join(joint.dofs)}, not {', '.join(names)}")
     if joint.mass:
         raise ValueError(
             f"joint has a mass in {', '.join(joint.mass)}, which FRFs at the joint do not separate from the sides; "

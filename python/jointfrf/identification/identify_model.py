@@ -1,4 +1,4 @@
-"""From any measured FRFs and models of the substructures to a joint: the door to the fit of a model."""
+"""From any measured FRFs and models of the substructures to a joint: entry point to the fit of a model."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from jointfrf.messages.of_data import FATAL_CODES
 
 __all__ = ["identify_model"]
 
-#: Errors that a search for wrong channels looks for itself.
+#: Errors that the search for wrong channels checks itself.
 _SOUGHT = ("driving-point-sign",)
 
 
@@ -56,40 +56,40 @@ def identify_model(
 ) -> Fit:
     """Identify a joint from any measured FRFs of the assembly, given its substructures as models or FRFs.
 
-    `identify` needs all FRFs between the joint DOFs, and no model; this needs models, and any FRFs: remote points,
-    translations only, one shaker position.
+    `identify` needs all FRFs between the joint DOFs, and no model. This function needs models, and any FRFs: remote
+    points, translations only, one shaker position.
 
     Parameters
     ----------
     freq_hz : array_like, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     h : array_like, shape (n_freq, n_responses, n_forces)
         Measured receptances, m/N; NaN on all lines for an FRF that was not measured.
     assembly : Assembly
-        Substructures, joint with its laws, masses and springs attached; with what is unknown of them.
+        Substructures, joint with its laws, attached masses and springs, and the unknowns of each.
     responses, forces : sequence of str
         DOFs ``"A/..."`` or ``"B/..."`` of the channels.
     response_gains, force_gains : mapping of str to Unknown, optional
         Calibration factors of channels that are not exactly 1: measured = factor times true.
     fixed : sequence of str
-        Parameters of the joint that keep the value they have in `assembly`, such as ``"c_y"``.
+        Parameters of the joint that keep their value in `assembly`, such as ``"c_y"``; none by default.
     noise : float, StatedNoise or array_like, shape of h, optional
         Relative noise level of each FRF, or its relative part and floors, or E|e|^2 of each FRF, (m/N)^2. By default it
-        is estimated, as `estimate_noise` does.
+        is estimated, see `estimate_noise`.
     coherence, averages : optional
-        As in `estimate_noise`, where `noise` is not given.
+        Coherence and number of averages of the FRFs if `noise` is not given; see `estimate_noise`.
     sensor_mass : float, optional
-        Mass of the accelerometer that moves from point to point, kg. By default it is found from h_pq - h_qp, if
-        responses and forces are the same translations, and removed with a warning; 0 if no mass moves.
+        Mass of the accelerometer that moves from point to point, kg; 0 if no mass moves. If responses and forces are
+        the same translations, the default is an estimate from h_pq - h_qp, which is removed with a warning.
     setups : SetUps, optional
-        Which FRF came from which set-up of the test, as `FrfSet.setups_between` returns it: what the FRFs of a set-up
-        have in common, and what all have, is in the intervals, and set-ups that disagree are named in the findings.
+        Set-up of the test of each FRF, from `FrfSet.setups_between`. Intervals cover errors common to the FRFs of a
+        set-up and errors common to all FRFs; findings name set-ups that disagree.
     find_wrong_channels : bool
-        Whether to look for one channel of the opposite sign, or two exchanged ones of the same quantity, with which the
-        models fit the FRFs far better. A warning names what was found and that the fit takes it so; where two changes
-        fit alike both are named and none is made.
+        Whether to search for one channel of the opposite sign, or two exchanged channels of the same quantity, with
+        which the models fit the FRFs far better; default True. The fit corrects the channels, and a warning names them.
+        If two changes fit equally, the warning names both, and neither is made.
     accept : sequence of str
-        Codes of errors of the data at which the fit does not stop: "quantity", "driving-point-sign", ...; none by
+        Codes of data errors at which the fit does not stop, such as "quantity" or "driving-point-sign"; none by
         default.
 
     Returns
@@ -100,7 +100,7 @@ def identify_model(
     Raises
     ------
     ValueError
-        Wrong shapes or names; NaN or Inf in a line; an unknown that there is not; fewer numbers than unknowns.
+        Wrong shapes or names; NaN or Inf in a line. An unknown that does not exist, or fewer numbers than unknowns.
     FrfCheckError
         The FRFs are of another quantity, sign or time convention, and this is not accepted.
     SingularLineError
@@ -109,27 +109,34 @@ def identify_model(
     Warns
     -----
     IdentificationWarning
-        The residual is more than noise, with where; a parameter is poorly determined, or a combination of them.
+        The residual is more than noise, with its place; a parameter, or a combination of parameters, is poorly
+        determined.
     ConvergenceWarning
         The fit did not converge.
     FrfCheckWarning
         The FRFs look wrong (`check_frfs`).
 
+    See Also
+    --------
+    identify : fit of FRFs between all joint DOFs, without models.
+    Assembly : parts, joint and unknowns.
+    validate : test of the identified joint with other FRFs.
+
     Notes
     -----
     Maximum likelihood for circular noise and normal priors. Models are reduced once; derivatives of the FRFs are
-    -H dZ H in the reduced model, those of matrices that a function builds by differences of the fourth order. The start
-    is K* of the smooth FRFs and the compliance fit where the FRFs between all joint DOFs are among those measured, else
-    the best of many trials. Noise that is relative is taken relative to the fitted FRFs in the end. Intervals by
-    profile likelihood.
+    -H dZ H in the reduced model. Matrices that a function builds are differentiated by differences of the fourth order.
+    If all FRFs between the joint DOFs were measured, the initial value is K* of the smooth FRFs and the compliance fit;
+    otherwise it is the best of many trials. Relative noise is finally taken relative to the fitted FRFs. Intervals
+    follow from the profile likelihood.
 
-    The price of a model is its error: 1 % of Young's modulus or of a length may move a stiffness by 20 %. What is not
-    exactly known of the models must be among the unknowns. An error that none of these describes shows in the residual,
-    and a warning says at which frequencies and in which channels, or in a prior that the FRFs deny.
+    Model errors enter the result: 1 % of Young's modulus or of a length may change a stiffness by 20 %. Declare every
+    quantity that is not exactly known as an unknown. Other model errors appear in the residual, and a warning names
+    their frequencies and channels, or as a contradiction between a prior and the FRFs.
 
-    Noise of FRFs of a substructure, Y = ... + P e Q to first order, is shared by the FRFs of the assembly: those of a
-    line are weighted by their whole covariance, with P and Q at the minimum. It is found or as said
-    (`Substructure.of_frfs`).
+    FRFs of the assembly share the noise of the FRFs of a substructure, Y = ... + P e Q to first order. The FRFs of a
+    line are therefore weighted by their full covariance, with P and Q at the minimum. The noise is estimated or given,
+    see `Substructure.of_frfs`.
 
     Examples
     --------
@@ -157,7 +164,7 @@ def identify_model(
     mass = None if sensor_mass is None else as_not_negative("sensor_mass", sensor_mass)
     known = NoiseOptions(noise, coherence, averages, setups=setups, sensor_mass=mass)
     problem = prepare_model_fit(freq_hz, h, assembly, channels, known, fixed, _springs_at_joint)
-    of_data = _look_at(problem, channels)
+    of_data = _data_checks(problem, channels)
     stop_at_errors(of_data, [*as_accepted(accept), *(_SOUGHT if find_wrong_channels else ())])
     if any(one.code == "amplitude-dependent" for one in of_data):
         problem = replace(problem, motion=motion_of_lines(problem.measured))
@@ -174,8 +181,8 @@ def identify_model(
     return fit
 
 
-def _look_at(problem: ModelProblem, channels: Channels) -> list[Finding]:
-    """Return errors and warnings of the FRFs, but for gains that are unknowns of the fit."""
+def _data_checks(problem: ModelProblem, channels: Channels) -> list[Finding]:
+    """Return errors and warnings of the FRFs, except gains that are unknowns of the fit."""
     wrong = wrong_numbers_of(problem.freq_hz, problem.measured)
     if wrong is not None:
         return [wrong]
@@ -195,7 +202,7 @@ def _look_at(problem: ModelProblem, channels: Channels) -> list[Finding]:
 
 
 def _changed(known: NoiseOptions, change: ChannelChange) -> NoiseOptions:
-    """Return what is known of the noise and the set-up of each FRF with a change of the channels."""
+    """Return noise options and the set-up of each FRF after a change of the channels."""
 
     def of(one: ArrayLike) -> ArrayLike:
         return one if np.ndim(one) != 3 else change.of(np.asarray(one, float), signed=False)
@@ -209,15 +216,16 @@ def _changed(known: NoiseOptions, change: ChannelChange) -> NoiseOptions:
 def _springs_at_joint(
     joint: LawJoint, freq_hz: FloatArray, gamma: ComplexArray, variance: FloatArray
 ) -> FloatArray | None:
-    """Return values of a joint of springs from the compliance fit; None for other joints, or where it finds none.
+    """Return initial values of a joint of springs from the compliance fit; None for other joints, or if it fails.
 
     Parameters
     ----------
     joint : LawJoint
+        Joint of the model.
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     gamma, variance : ndarray, shape (n_freq, 2 n, 2 n)
-        FRFs between all joint DOFs j, then k, m/N, and E|e|^2.
+        FRFs between all joint DOFs j, then k, m/N, and their noise variance E|e|^2, (m/N)^2.
     """
     if joint.rigid or not all(isinstance(law, SpringLaw) for law in joint.laws.values()):
         return None

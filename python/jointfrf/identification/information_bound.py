@@ -1,4 +1,4 @@
-"""The Cramer-Rao bound of a joint without cross terms between structures of which nothing is known."""
+"""The Cramer-Rao bound of a joint without cross terms between unknown structures."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ __all__ = ["information_rows", "least_std_errors"]
 
 
 def least_std_errors(freq_hz: FloatArray, gamma: ComplexArray, variance: FloatArray) -> FloatArray:
-    """Least standard deviations of unbiased estimates of stiffness and viscous damping.
+    """Return least standard deviations of unbiased estimates of stiffness and viscous damping.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     gamma : ndarray, shape (n_freq, 2 n, 2 n)
         Exact receptance of the assembly at joint DOFs j, then k, m/N; symmetric.
     variance : ndarray, shape (n_freq, 2 n, 2 n)
-        E|e|^2 of each entry, (m/N)^2: independent, circular and normal, above 0.
+        Noise variance E|e|^2 of each entry, (m/N)^2: independent, circular and normal, above 0.
 
     Returns
     -------
     ndarray, shape (2 n,)
-        Of the stiffness of all DOFs, then of damping.
+        Least standard deviations of the stiffness of all DOFs, then of the damping, in SI units.
 
     Notes
     -----
-    Unknown on each line are the symmetric dynamic stiffnesses of both sides, Z_A and Z_B; with
+    The unknowns of each line are the symmetric dynamic stiffnesses Z_A and Z_B of the sides. From
     gamma^-1 = [[Z_A + K*, -K*], [-K*, Z_B + K*]] all derivatives are -gamma dZ gamma. gamma is analytic in the unknowns
-    of a line: they take a complex subspace out of what the line says of the parameters.
+    of a line. They therefore remove a complex subspace from the information of the line on the parameters.
     """
     rows = information_rows(freq_hz, gamma, variance)
     information = 2 * np.einsum("lfp,lfq->pq", rows.conj(), rows, optimize=True).real
@@ -47,11 +47,11 @@ def least_std_errors(freq_hz: FloatArray, gamma: ComplexArray, variance: FloatAr
 def information_rows(
     freq_hz: FloatArray, gamma: ComplexArray, variance: FloatArray, kinds: Sequence[str] = ("k", "c")
 ) -> ComplexArray:
-    """Return what each FRF of each line says of the parameters, shape (n_freq, 4 n^2, n_parameters).
+    """Return the information of each FRF of each line on the parameters, shape (n_freq, 4 n^2, n_parameters).
 
-    Twice the real part of the products of these rows, summed over FRFs and lines, is the information. Parameters are
-    those of all DOFs of each kind: stiffness k, viscous c and hysteretic h. As the sides are eliminated by least
-    squares, the products of one row are also the derivative of the information by the weight of its FRF.
+    Twice the real part of the products of these rows, summed over FRFs and lines, is the information. The parameters
+    are stiffness k, viscous c and hysteretic h of all DOFs, one kind after another. The sides are eliminated by least
+    squares, so the products of one row are also the derivative of the information by the weight of its FRF.
     """
     n = gamma.shape[1] // 2
     weight = 1 / np.sqrt(variance)

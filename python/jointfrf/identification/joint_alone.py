@@ -1,4 +1,4 @@
-"""From a fit as seen between virtual points of sides that bend to that of the joint alone."""
+"""Correction of a fit between virtual points of flexible sides to the joint alone."""
 
 from __future__ import annotations
 
@@ -17,23 +17,24 @@ from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["with_joint_alone"]
 
-#: Standard deviations of the 95 % intervals that `JointAlone` holds.
+#: Standard deviations of the 95 % intervals in `JointAlone`.
 _REACH = 1.96
 
 
 def with_joint_alone(fit: Fit, alone: JointAlone) -> Fit:
-    """Return a fit whose stiffnesses are those of the joint alone, with those seen beside them.
+    """Return a fit of the stiffnesses of the joint alone, with the stiffnesses between virtual points in `seen`.
 
     Parameters
     ----------
     fit : Fit
-        Of springs and dampers, as seen between the virtual points.
+        Fit of springs and dampers between the virtual points.
     alone : JointAlone
+        Stiffnesses of the joint without the sides.
 
     Notes
     -----
-    Sides that bend add a real compliance D0: K* keeps its imaginary compliance, so that damping goes with the square of
-    the stiffness. Cross terms go with the roots of both stiffnesses, which keeps K positive.
+    Flexible sides add a real compliance D0. K* keeps its imaginary compliance, so that damping is proportional to the
+    square of the stiffness. Cross terms are proportional to the roots of both stiffnesses, which keeps K positive.
     """
     of_dof = {dof: d for d, dof in enumerate(fit.dofs)}
     places = [(of_dof[one.row], of_dof[one.column]) for one in fit.parameters]
@@ -54,12 +55,12 @@ def with_joint_alone(fit: Fit, alone: JointAlone) -> Fit:
         estimate=estimate,
         covariance=fit.correlation * np.outer(errors, errors),
         intervals=intervals,
-        seen=_seen(fit, alone),
+        seen=_between_points(fit, alone),
     )
 
 
 def _diagonal_of_inverse(fit: Fit) -> FloatArray:
-    """Return C_dd of the joint fitted."""
+    """Return C_dd of the fitted joint."""
     try:
         found = np.diagonal(np.linalg.inv(fit.stiffness_matrix))
     except np.linalg.LinAlgError:
@@ -68,14 +69,14 @@ def _diagonal_of_inverse(fit: Fit) -> FloatArray:
 
 
 def _error(is_stiffness: bool, value: float, low: float, high: float, otherwise: float) -> float:
-    """Return the standard error that an interval of 95 % comes to; of a stiffness by that of its compliance."""
+    """Return the standard error equivalent to a 95 % interval; for a stiffness by the interval of its compliance."""
     if is_stiffness and low > 0:
         return value**2 * (1 / low - 1 / high) / (2 * _REACH)
     return (high - low) / (2 * _REACH) if np.isfinite(low) and np.isfinite(high) else otherwise
 
 
-def _seen(fit: Fit, alone: JointAlone) -> dict[str, SeenStiffness]:
-    """Return the stiffness seen of each DOF, and what makes the interval of the joint alone wide."""
+def _between_points(fit: Fit, alone: JointAlone) -> dict[str, SeenStiffness]:
+    """Return the stiffness of each DOF between virtual points, and the causes of a wide interval of the joint alone."""
     parts = np.array([np.hypot(alone.softer, alone.stiffer), alone.inertia, alone.noise]) ** 2
     shares = parts / np.maximum(parts.sum(axis=0), np.finfo(float).tiny)
     low, high = alone.seen - alone.reach, alone.seen + alone.reach
@@ -114,7 +115,7 @@ class _Intervals:
     def of_function(
         self, function: Callable[[FloatArray], float], used: NDArray[np.intp], probability: float
     ) -> tuple[float, float] | None:
-        """Return that of a function: open where a parameter is, else by the covariance."""
+        """Return the interval of a function: unbounded if a parameter is, else from the covariance."""
         limits = list(self(probability).values())
         return None if np.isfinite([limits[i] for i in used]).all() else (-np.inf, np.inf)
 
@@ -141,7 +142,7 @@ class _Intervals:
 
 
 def _product(limits: list[float], factors: list[float]) -> tuple[float, float]:
-    """Return the interval of a product of two numbers of which each has its own; open where one is."""
+    """Return the interval of a product of two numbers with intervals; unbounded if one of these is."""
     if not np.isfinite([*limits, *factors]).all():
         return -np.inf, np.inf
     ends = [limit * factor for limit in limits for factor in factors]

@@ -21,17 +21,18 @@ __all__ = ["JointFile", "read_joint", "read_joint_file", "write_joint"]
 
 
 class JointFile(NamedTuple):
-    """What a file says of a joint.
+    """Content of a joint file.
 
     Attributes
     ----------
     joint : Joint or LawJoint
+        The joint.
     fit : Fit or None
-        Where the file was saved by an identification.
+        Fit of the joint, if an identification saved the file.
     points : ndarray, shape (2, 3), or None
         Reference points of both sides, m.
     about : tuple of str
-        Where the joint comes from.
+        Origin of the joint.
     """
 
     joint: Joint | LawJoint
@@ -74,17 +75,18 @@ def _written(table: TomlTable) -> JointFile:
 
 
 def read_joint(path: Path | str) -> Joint | LawJoint:
-    """Read a joint from a file.
+    """Read a joint from a file and return it.
 
     Parameters
     ----------
     path : Path or str
-        A TOML file of constants (`dofs`, `stiffness`, ...) or of laws (tables `[[law]]`), as `write_joint` writes; or a
-        JSON file of `save`.
+        Name of a TOML file of constants (`dofs`, `stiffness`, ...) or of laws (tables `[[law]]`), as `write_joint`
+        writes; or of a JSON file of `save`.
 
     Returns
     -------
     Joint or LawJoint
+        The joint in the file.
 
     Raises
     ------
@@ -92,6 +94,11 @@ def read_joint(path: Path | str) -> Joint | LawJoint:
         There is no such file.
     FileContentError
         It is no joint, or something in it is wrong.
+
+    See Also
+    --------
+    write_joint : write a joint to a TOML file.
+    load : read a fit from a JSON file.
 
     Examples
     --------
@@ -106,13 +113,14 @@ def read_joint(path: Path | str) -> Joint | LawJoint:
 
 
 def write_joint(path: Path | str, joint: Joint | LawJoint) -> Path:
-    """Write a joint to a TOML file, whole or not at all; `read_joint` gives the same joint again.
+    """Write a joint to a TOML file, whole or not at all, and return the path; `read_joint` reads it.
 
     Parameters
     ----------
     path : Path or str
-        Its name ends in .toml; in a folder that exists.
+        Name of the file, which ends in .toml, in a folder that exists.
     joint : Joint or LawJoint
+        Joint to write.
 
     Returns
     -------
@@ -122,11 +130,23 @@ def write_joint(path: Path | str, joint: Joint | LawJoint) -> Path:
     Raises
     ------
     ValueError
-        Another ending; a `FunctionLaw`, which a file cannot hold.
+        Another ending; a `FunctionLaw`, which a file cannot contain.
     TypeError
         It is no joint.
     OSError
         The file cannot be written.
+
+    See Also
+    --------
+    read_joint : read the joint again.
+    save : write a fit with its uncertainty.
+
+    Examples
+    --------
+    >>> import tempfile, jointfrf as jf
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     print(jf.write_joint(f"{folder}/bolt.toml", jf.Joint([2000.0], [3.0], dofs=["x"])).name)
+    bolt.toml
     """
     if not isinstance(joint, Joint | LawJoint):
         raise TypeError(f"joint must be a Joint or a LawJoint, not {type(joint).__name__}")

@@ -1,4 +1,4 @@
-"""Values of a joint from its compliance on single lines: where a fit may start."""
+"""Initial values of a joint from its compliance on single lines."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from jointfrf.substructuring.compliance import joint_compliance
 
 __all__ = ["LineCompliance", "from_lines", "interface_compliance"]
 
-#: Linearisations of a stiffness in its compliance, and its largest ratio to that found before.
+#: Number of linearisations of a stiffness in its compliance, and its largest ratio to the previous value.
 _COMPLIANCE_STEPS, _LARGEST_RATIO = 4, 1.5
 
 
@@ -26,9 +26,9 @@ def interface_compliance(smooth: ComplexArray, variance: FloatArray, at: tuple[l
     Parameters
     ----------
     smooth, variance : ndarray, shape (n_freq, n_o, n_i)
-        Smooth FRFs, and E|e|^2 of the measured ones.
+        Smooth FRFs, m/N, and noise variance E|e|^2 of the measured ones, (m/N)^2.
     at : pair of list of int
-        Channels of the joint DOFs j, then k: responses and forces.
+        Channels of the joint DOFs j, then k, among responses and forces.
     """
     rows, columns = at
     n = len(rows) // 2
@@ -36,26 +36,28 @@ def interface_compliance(smooth: ComplexArray, variance: FloatArray, at: tuple[l
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IllConditionedWarning)
         c = joint_compliance(gamma, on_singular="nan")
-    # Noise of C is that of gamma_kk + gamma_jj and what transmits it, roughly.
+    # The noise of C is roughly the noise of gamma_kk + gamma_jj and of its transmission.
     level = np.median(variance[:, rows][:, :, columns] / np.maximum(abs(gamma) ** 2, 1e-300))
     size = abs(np.einsum("lpp->lp", gamma))
     return LineCompliance(c, level * (size[:, :n] + size[:, n:]) ** 2)
 
 
 def from_lines(joint: LawJoint, omega: FloatArray, lines: LineCompliance) -> FloatArray | None:
-    """Return values of the joint from its compliance on each line.
+    """Return initial values of the parameters of the joint from its compliance on each line.
 
     Parameters
     ----------
     joint : LawJoint
+        Joint of the fit.
     omega : ndarray, shape (n_freq,)
-        rad/s.
+        Angular frequencies, rad/s.
     lines : LineCompliance
+        Compliance on each line.
 
     Returns
     -------
     ndarray, shape (p,), or None
-        Of the joint, None where lines do not give it.
+        Values of the parameters of the joint, None if the lines do not determine them.
     """
     values, laws = [], dict(joint.laws)
     coupled = {dof for pair in joint.laws if pair[0] != pair[1] for dof in pair}
@@ -81,23 +83,23 @@ def from_lines(joint: LawJoint, omega: FloatArray, lines: LineCompliance) -> Flo
 
 
 def _started(law: JointLaw, omega: FloatArray, k: ComplexArray, variance: FloatArray) -> JointLaw | None:
-    """Return a law near to K* of the lines; None where these say nothing."""
+    """Return a law near to K* of the lines; None if these do not determine one."""
     usable = np.isfinite(variance) & (variance > 0) & np.isfinite(k)
     if not usable.any():
         return None
     weight = np.where(usable, 1 / np.where(usable, variance, 1), 0)
-    # A line where noise hides the joint shows a stiffness that means nothing.
+    # On a line where noise exceeds the joint, the stiffness is meaningless.
     weight = np.minimum(weight, 20 * np.median(weight[usable]))
     return law.started(omega, np.where(usable, k, np.nan), np.maximum(weight, 1e-300))
 
 
 def _of_compliance(law: JointLaw, omega: FloatArray, c: ComplexArray, variance: FloatArray) -> JointLaw | None:
-    """Return a law whose compliance is near to that of the lines, in which noise is additive: K* of it is biased."""
+    """Return a law with a compliance near to the lines, on which noise is additive; K* would be biased."""
     found = _started(law, omega, 1 / c, variance / abs(c) ** 4)
     for _ in range(_COMPLIANCE_STEPS):
         if found is None:
             return None
-        # K* of c linearised at K* found, no farther than half and twice of it.
+        # K* of c, linearised at the current K*, between half and twice of it.
         k = found.stiffness(omega)
         ratio = c * k
         ratio = ratio * np.minimum(1, _LARGEST_RATIO / np.maximum(abs(ratio), 1e-300))
@@ -111,9 +113,9 @@ class LineCompliance(NamedTuple):
     Attributes
     ----------
     c : ndarray, shape (n_freq, n, n)
-        K*^-1, m/N; NaN on lines that do not give it.
+        Compliance K*^-1, m/N; NaN on lines that do not determine it.
     variance : ndarray, shape (n_freq, n)
-        Of the noise of its diagonal, but for a factor.
+        Noise variance of the diagonal of `c`, up to a common factor.
     """
 
     c: ComplexArray

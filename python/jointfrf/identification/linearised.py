@@ -1,4 +1,4 @@
-"""A likelihood about its minimum: normal equations, and what each line, channel and error of FRFs adds to them."""
+"""A likelihood about its minimum: normal equations, and the contributions of lines, channels and errors of FRFs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,9 @@ class LineParts(NamedTuple):
     Attributes
     ----------
     gradient : ndarray, shape (n_parts, p)
+        Gradient of each part by the coordinates.
     information : ndarray, shape (n_parts, p, p)
+        Information of each part on the coordinates.
     """
 
     gradient: FloatArray
@@ -38,6 +40,7 @@ class Linearised(ABC):
     Attributes
     ----------
     n_freq : int
+        Number of lines.
     information : ndarray, shape (p, p)
         Fisher information of the coordinates, priors included.
     determined : ndarray of bool, shape (p,)

@@ -13,22 +13,26 @@ __all__ = ["Minimum", "NormalEquations", "Squares", "full_step", "inverse_inform
 
 #: Levenberg's parameter: first value, factors where a step succeeds and fails, smallest and largest value.
 _FIRST, _LOWERED, _RAISED, _SMALLEST, _LARGEST = 1e-3, 0.1, 8.0, 1e-9, 1e9
-#: A minimum is found when a step promises less than this of -2 log likelihood, or when two steps in a row gain less.
+#: The iteration converges if a step predicts a decrease of -2 log likelihood below the first value, or if two steps in
+#: a row decrease it by less than the second.
 _LEAST, _SMALL = 1e-4, 1e-3
-#: Rounding of a sum of squares: a gain of this share of it is none.
+#: Rounding of a sum of squares: a relative decrease below this is zero.
 _ROUNDING = 1e-12
-#: Directions of less information than this share of the largest are rounding: of a step, and of an inverse.
+#: Directions with less information than this share of the largest are rounding: in a step, and in an inverse.
 _NOT_SOLVED, _SEEN = 1e-13, 1e-15
 
 
 class NormalEquations(NamedTuple):
-    """Squares about a point: cost, half of their second derivatives, and minus half of their first.
+    """Sum of squares about a point: cost, half of its second derivatives, and minus half of its gradient.
 
     Attributes
     ----------
     cost : float
+        Sum of squares.
     information : ndarray, shape (p, p)
+        Half of the second derivatives.
     gradient : ndarray, shape (p,)
+        Minus half of the first derivatives.
     """
 
     cost: float
@@ -41,7 +45,7 @@ class Squares(Protocol):
 
     @property
     def unit(self) -> float:
-        """What the sum has to be divided by to be -2 log likelihood."""
+        """Factor by which the sum is divided to give -2 log likelihood."""
 
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -51,10 +55,10 @@ class Squares(Protocol):
         """Return the largest step of each coordinate from a point."""
 
     def cost(self, x: FloatArray) -> float:
-        """Return the sum; inf where there is none."""
+        """Return the sum; inf outside the range of the model."""
 
     def linearised(self, x: FloatArray) -> NormalEquations:
-        """Return it with its derivatives; NaN where there is no sum."""
+        """Return the sum with its derivatives; NaN outside the range of the model."""
 
 
 class Minimum(NamedTuple):
@@ -65,14 +69,17 @@ class Minimum(NamedTuple):
     x : ndarray, shape (p,)
         Coordinates.
     cost : float
+        Sum of squares.
     information : ndarray, shape (p, p)
         Half of the second derivatives.
     gradient : ndarray, shape (p,)
-        Minus half of the first: zero but for coordinates at their bound.
+        Minus half of the first derivatives: zero except for coordinates at a bound.
     converged : bool
+        Whether the iteration converged.
     at_bound : ndarray of bool, shape (p,)
+        Whether each coordinate is at a bound.
     promised : float
-        By how much the next step promises to lower the cost, if the iteration ended before a minimum.
+        Predicted decrease of the cost by the next step, if the iteration ended before a minimum.
     """
 
     x: FloatArray
@@ -92,21 +99,22 @@ def minimise(
     least: float = _LEAST,
     small: float = _SMALL,
 ) -> Minimum:
-    """Minimise squares from a start.
+    """Minimise squares from initial values and return the minimum.
 
     Parameters
     ----------
     squares : Squares
+        Objective.
     start : ndarray, shape (p,)
-        Coordinates.
+        Initial coordinates.
     held : int, optional
-        A coordinate that keeps its value.
+        Number of a coordinate that stays fixed.
     steps : int
-        At most so many linearisations.
+        Maximum number of linearisations.
     least, small : float
-        The iteration ends when the next step promises to lower -2 log likelihood by less than the first, or when two
-        steps in a row lowered it by less than the second: where squares hardly determine a direction, steps promise
-        more than they gain.
+        Tolerances of -2 log likelihood. The iteration ends when the next step predicts a decrease below `least`, or
+        when two steps in a row decreased it by less than `small`. If squares hardly determine a direction, the
+        predicted decrease exceeds the actual one.
     """
     lower, upper = squares.bounds
     least, small = least * squares.unit, small * squares.unit
@@ -133,7 +141,7 @@ def minimise(
                 break
             damping *= _RAISED
         if damping > _LARGEST:
-            # No step lowers the squares: they are at the rounding of their sum.
+            # No step lowers the squares: the decrease is below the rounding of their sum.
             converged = promised < max(10 * least, 1e-6 * at.cost)
             break
         gain = at.cost - cost
@@ -150,19 +158,19 @@ def minimise(
 
 
 def full_step(at: NormalEquations, x: FloatArray, bounds: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, float]:
-    """Return the minimum of squares by their derivatives at a point, and by how much it promises to be lower."""
+    """Return the minimum of the quadratic model at a point, and the predicted decrease."""
     step, promised = _Steps(at, np.flatnonzero(_can_move(at, x, bounds))).step(0.0)
     return np.clip(x + step, *bounds), promised
 
 
 def _can_move(at: NormalEquations, x: FloatArray, bounds: tuple[FloatArray, FloatArray]) -> NDArray[np.bool_]:
-    """Whether coordinates are not at a bound that the squares press them against."""
+    """Return which coordinates are not at a bound against which the gradient points."""
     lower, upper = bounds
     return ~(((x <= lower) & (at.gradient < 0)) | ((x >= upper) & (at.gradient > 0)))
 
 
 class _Steps:
-    """Steps from a point for any damping, by the eigenvectors of the information in units of each coordinate."""
+    """Steps from a point at any damping, by the eigenvectors of the scaled information."""
 
     def __init__(self, at: NormalEquations, moving: NDArray[np.intp]) -> None:
         self.moving, self.p = moving, at.gradient.size
@@ -172,7 +180,7 @@ class _Steps:
         self.along = self.vector.T @ (at.gradient[moving] / self.size)
 
     def step(self, damping: float) -> tuple[FloatArray, float]:
-        """Return the step, and by how much it promises to lower the squares."""
+        """Return the step, and the predicted decrease of the squares."""
         step, value = np.zeros(self.p), self.value + damping
         length = abs(value)
         seen = length > _NOT_SOLVED * length.max(initial=0)
@@ -182,14 +190,15 @@ class _Steps:
 
 
 def inverse_information(information: FloatArray, *, open_ends: bool = False) -> FloatArray:
-    """Inverse of information matrices of parameters of very different size; a pseudo-inverse where one has none.
+    """Return the inverse of information matrices with parameters of very different size, or a pseudo-inverse.
 
     Parameters
     ----------
     information : ndarray, shape (..., p, p)
+        Information matrices.
     open_ends : bool
-        Whether directions without information have the variance of what rounding leaves, as parameters that are shown
-        need it; none in a pseudo-inverse.
+        Whether directions without information get the variance of rounding, for printed parameters. By default their
+        variance is zero, as in a pseudo-inverse.
     """
     size = np.sqrt(np.maximum(np.einsum("...aa->...a", information), TINY))
     value, vector = np.linalg.eigh(information / (size[..., :, None] * size[..., None, :]))

@@ -1,4 +1,4 @@
-"""The mixed model: errors with a variance of their own, as columns beside those of the parameters.
+"""The mixed model: random effects with a variance, as columns next to the columns of the parameters.
 
 r = J dx + sum over k of B_k u_k + e,   u_k ~ N(0, v_k I),   e ~ N(0, I)
 
@@ -23,7 +23,7 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["Added", "Effect", "added_by", "mass_effects", "parameter_ratio", "smooth_effects", "student_factor"]
 
-#: A variance has at least so many degrees of freedom.
+#: Least number of degrees of freedom of a variance.
 _LEAST_DEGREES = 1.0
 
 
@@ -35,6 +35,7 @@ class Effect(NamedTuple):
     gradient : ndarray, shape (n_errors, n_parts, p)
         Change of the gradient on each part of the band by a unit of each error.
     variance : float
+        Variance of the errors.
     degrees : float
         Degrees of freedom of the variance; inf if it was given.
     squares : float
@@ -67,7 +68,7 @@ class Effect(NamedTuple):
 
 
 class Added(NamedTuple):
-    """What effects add to the uncertainty.
+    """Contribution of random effects to the uncertainty.
 
     Attributes
     ----------
@@ -111,7 +112,7 @@ def added_by(effects: Sequence[Effect], at: Linearised) -> Added:
 
 
 def parameter_ratio(added: FloatArray, at: Linearised) -> FloatArray:
-    """Return the variance of each parameter by a covariance of the coordinates over that by noise, shape (p,)."""
+    """Return the variance of each parameter by a covariance of the coordinates over the noise variance, shape (p,)."""
     own, noise = (np.einsum("ij,jk,ik->i", at.slope, one, at.slope) for one in (added, at.covariance))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.nan_to_num(own / noise))
@@ -123,7 +124,7 @@ def student_factor(noise: FloatArray, added: FloatArray, degrees: FloatArray) ->
     Parameters
     ----------
     noise, added : ndarray
-        The part that is known, and the part that was estimated.
+        Known part and estimated part of the variance.
     degrees : ndarray
         Degrees of freedom of the estimated part.
 
@@ -166,18 +167,20 @@ def smooth_effects(
     Parameters
     ----------
     at : Linearised
+        Likelihood about its minimum.
     errors : CalibrationErrors or None
+        Smooth errors of the FRFs.
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     shape : (int, int)
         Numbers of responses and forces.
     member : ndarray, shape (n_parts, n_freq)
-        Lines of each part of the band, 1 and 0.
+        Indicator of the lines of each part of the band, 1 and 0.
 
     Notes
     -----
-    h_pq - h_qp show the difference of the errors of response and force p only. Their sum is taken to be as large: both
-    are independent.
+    h_pq - h_qp shows only the difference of the errors of response and force p. Their sum is assumed to be as large,
+    because both are independent.
     """
     if errors is None:
         return []

@@ -39,9 +39,9 @@ class BandStatistics(NamedTuple):
     Attributes
     ----------
     stiffness, stiffness_std : ndarray
-        Mean of Re K* over the lines of the band, N/m.
+        Mean of Re K* over the lines of the band, and its standard deviation, N/m.
     damping, damping_std : ndarray
-        Mean of Im K*/w, N s/m.
+        Mean of Im K*/w, and its standard deviation, N s/m.
     """
 
     stiffness: FloatArray
@@ -57,17 +57,17 @@ class MonteCarlo:
     Attributes
     ----------
     count : int
-        Realisations of every line.
+        Number of realisations of every line.
     good : ndarray of int32, shape (n_freq,)
-        How many of them could be identified; the others are excluded.
+        Number of realisations that were identified; all further realisations are excluded.
     mean : ndarray, shape (n_freq, n, n)
-        Mean over the good ones, N/m (m/N for "compliance"); NaN where there is none.
+        Mean over the good realisations, N/m (m/N for "compliance"); NaN if there is none.
     covariance : ndarray, shape (n_freq, n, n, 3)
-        Var Re, Var Im and Cov(Re, Im) of each entry; NaN where fewer than two are good.
+        Var Re, Var Im and Cov(Re, Im) of each entry; NaN if fewer than two realisations are good.
     line_info : ndarray of int32, shape (n_freq,)
-        0, or where no realisation is good what was wrong with the first, see `LineStatus`.
+        Status of the line: 0, or the error of the first realisation if none is good, see `LineStatus`.
     rcond : ndarray, shape (n_freq,)
-        Smallest reciprocal condition number over the good ones.
+        Smallest reciprocal condition number over the good realisations.
     """
 
     count: int
@@ -91,18 +91,19 @@ class MonteCarlo:
         return error
 
     def band(self, freq_hz: ArrayLike, bands: Sequence[Band]) -> BandStatistics:
-        """Statistics of the means over a band that single realisations give.
+        """Return statistics of the band means of single realisations.
 
         Parameters
         ----------
         freq_hz : array_like, shape (n_freq,)
             Frequency lines, Hz.
         bands : sequence of (low, high)
-            Hz; all of them together are the band.
+            Intervals that together are the band, Hz.
 
         Returns
         -------
         BandStatistics
+            Means and standard deviations.
 
         Raises
         ------
@@ -112,7 +113,7 @@ class MonteCarlo:
         Notes
         -----
         The noise of different lines is independent, so the variance of a mean over N lines is the sum of their
-        variances over N^2. It is exact where no line has lost realisations.
+        variances over N^2. It is exact if no line has lost realisations.
         """
         freq = as_frequency(freq_hz, self.good.size)
         inside = in_bands(freq, bands)
@@ -147,40 +148,47 @@ def monte_carlo(
     on_singular: OnSingular = "raise",
     rng: int | np.random.Generator | None = None,
 ) -> MonteCarlo:
-    """Mean and covariance of the joint identified from polluted FRFs.
+    """Return mean and covariance of the joint identified from polluted FRFs.
 
     Parameters
     ----------
     gamma : array_like, shape (n_freq, 2 n, 2 n)
         Exact receptance of the assembly at joint DOFs j, then k, m/N; it is polluted.
     level, kind, seed, relative_to, reciprocal, block, rng
-        The noise, as in `pollute`.
+        Options of the noise; see `pollute`.
     count, first : int
-        Realisations `first` to `first + count - 1`, the very ones that `realisations` gives.
+        Number of realisations and the number of the first one, which are the realisations of `realisations`.
     method : {"ismm", "inverse-substructuring", "compliance"}
-        As `ismm`, `inverse_substructuring` or `joint_compliance`, line by line.
+        Method line by line: `ismm`, `inverse_substructuring` or `joint_compliance`.
     alpha : array_like, shape (n_freq, 2 n, 2 n), optional
-        For "ismm": calculated receptance of the assembly with K0, free of noise, m/N.
+        Calculated receptance of the assembly with K0, free of noise, m/N; needed by "ismm".
     k_initial : array_like, shape (n_freq, n, n) or (n, n), optional
-        For "ismm": first estimate K0, N/m.
+        Initial value K0, N/m; needed by "ismm".
     freq_hz, on_singular
-        As in `couple`; a line is bad where no realisation can be identified.
+        Frequencies, Hz, and treatment of singular lines; see `couple`. A line is singular if no realisation can be
+        identified.
 
     Returns
     -------
     MonteCarlo
+        Mean and covariance of each line.
 
     Raises
     ------
     SingularLineError, ValueError
-        As in `couple` and `pollute`; alpha or k_initial missing for "ismm", or given for another method.
+        An error of `couple` or `pollute`; alpha or k_initial missing for "ismm", or given for another method.
+
+    See Also
+    --------
+    realisations : the polluted FRFs themselves.
+    identify_realisations : a fit of each set of FRFs.
 
     Notes
     -----
     Memory does not depend on `count`. Results do not depend on the number of threads; other engines differ by rounding.
-    Noise is on gamma only, so that by D = gamma^-1 - alpha^-1, eq. (2.40), ISMM is K0 + (alpha^-1)_jk - (gamma^-1)_jk,
-    of which all but the last term is done once a line. Where noise makes gamma nearly singular, K* has heavy
-    tails; mean and variance then converge slowly or not at all, and quantiles from `realisations` say more.
+    Noise is on gamma only. By D = gamma^-1 - alpha^-1, eq. (2.40), ISMM is K0 + (alpha^-1)_jk - (gamma^-1)_jk, and only
+    the last term depends on the realisation. If noise makes gamma nearly singular, K* has heavy tails. Mean and
+    variance then converge slowly or not at all; use quantiles from `realisations`.
 
     Examples
     --------

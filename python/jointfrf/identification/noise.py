@@ -1,4 +1,4 @@
-"""Noise of measured FRFs as a fit uses it: as the user gives it, found from them, or assumed."""
+"""Noise of measured FRFs for a fit: given by the user, estimated, or assumed."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ __all__ = [
     "without_mass",
 ]
 
-#: Relative noise where neither the data nor the user give one: it is replaced by that of the residual.
+#: Relative noise if neither the data nor the user give one: the level of the residual replaces it.
 _ASSUMED_LEVEL = 0.01
-#: Smooth FRFs that lie so many standard deviations of the noise off the measured ones are none of a line.
+#: Distance of smooth from measured FRFs, in standard deviations of the noise, beyond which they are not used on a line.
 _MISSED = 3.0
 #: Relative noise below this is rounding.
 _LEAST_LEVEL = 1e-7
-#: FRFs of single channels count as no smaller than this share of their largest line: their noise is then not zero.
+#: Least size of FRFs of single channels, relative to their largest line, so that their noise is not zero.
 _LEAST_SIZE = 1e-6
 _TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
 class NoiseOptions:
-    """What is known of the noise, as in `identify`, `identify_model` and `estimate_noise`."""
+    """Options on the noise, as in `identify`, `identify_model` and `estimate_noise`."""
 
     noise: float | StatedNoise | ArrayLike | None = None
     coherence: ArrayLike | None = None
@@ -54,7 +54,7 @@ class NoiseOptions:
     sensor_mass: float | None = 0.0
 
     def on_lines(self, kept: NDArray[np.bool_], shape: tuple[int, ...]) -> NoiseOptions:
-        """Return the same for some of the lines of FRFs of a shape; what is not of this shape raises an error."""
+        """Return the options for some of the lines of FRFs of a shape; an array of another shape raises an error."""
         found = self
         if self.coherence is not None:
             found = replace(found, coherence=as_real("coherence", self.coherence, shape)[kept])
@@ -67,20 +67,20 @@ class NoiseOptions:
         return found
 
     def calibration(self, freq: FloatArray, h: ComplexArray, *, reciprocal: bool) -> CalibrationErrors | None:
-        """Return errors of FRFs that are smooth over frequency, where the FRFs of these lines show any."""
+        """Return errors that are smooth over frequency, if the FRFs of these lines show any."""
         if not reciprocal and self.setups is None:
             return None
         return calibration_errors(freq, h, self.setups, reciprocal=reciprocal)
 
     @property
     def _variances(self) -> ArrayLike | None:
-        """The variance of each FRF, where it is given."""
+        """The given variance of each FRF."""
         if self.noise is None or isinstance(self.noise, StatedNoise):
             return None
         return self.noise if np.ndim(self.noise) > 0 else None
 
     def stated(self) -> StatedNoise | None:
-        """Return the parts of the noise where they are given; check that nothing else is."""
+        """Return the given parts of the noise; check that no further option is given."""
         if self.noise is not None and (self.coherence is not None or self.averages is not None):
             raise ValueError("coherence and averages are used where noise is not given: leave one of them out")
         if isinstance(self.noise, StatedNoise):
@@ -93,38 +93,38 @@ class NoiseOptions:
         return StatedNoise(level)
 
     def variance(self, shape: tuple[int, ...], shown: NDArray[np.bool_]) -> FloatArray:
-        """Return the variances given; positive for the FRFs that were measured, shape (n_o, n_i)."""
+        """Return the given variances; positive for the FRFs that were measured, shape (n_o, n_i)."""
         assert self._variances is not None
         variance = as_real("noise", self._variances, shape)
         if not (variance[:, shown] > 0).all():
-            raise ValueError("noise must hold positive variances: E|e|^2 of each FRF that was measured")
+            raise ValueError("noise must contain positive variances: E|e|^2 of each FRF that was measured")
         return variance
 
 
 @dataclass(frozen=True)
 class KnownNoise:
-    """Noise of the FRFs as a fit uses it.
+    """Noise of the FRFs for a fit.
 
     Attributes
     ----------
     level : float
         Median of the noise relative to the FRFs.
     inflation : float
-        By how much correlation between lines makes the variance of a mean larger.
+        Factor by which correlation between lines increases the variance of a mean.
     is_assumed : bool
-        Whether the level is only a guess, to be replaced by that of the residual.
+        Whether the level is only a guess, to be replaced by the level of the residual.
     outlying : ndarray of int
-        Lines whose noise is far above that of the others.
+        Lines whose noise is far above the noise of all further lines.
     model : NoiseModel, optional
-        Noise of the channels, where it was found from their FRFs; not of long sweeps.
+        Noise of the channels, if estimated from their FRFs; not for long sweeps.
     is_given : bool
         Whether the user gave the noise.
     stated : StatedNoise, optional
         Noise that the user gave by its parts.
     smooth : SmoothFrfs, optional
-        By noise that the user gave; not of long sweeps.
+        Smooth FRFs by the noise that the user gave; not for long sweeps.
     calibration : CalibrationErrors, optional
-        Errors of the FRFs that are smooth over frequency, where h_pq and h_qp show any.
+        Errors of the FRFs that are smooth over frequency, if h_pq and h_qp show any.
     mass : MovingMass, optional
         Mass of a sensor that moves, which was removed from the FRFs.
     cross_axis : CrossAxis, optional
@@ -145,7 +145,7 @@ class KnownNoise:
 
     @property
     def like(self) -> NoiseModel | SmoothFrfs | None:
-        """What other realisations start from."""
+        """Noise with which fits of further realisations start."""
         return self.model or self.smooth
 
     @classmethod
@@ -162,7 +162,7 @@ class KnownNoise:
 
     @classmethod
     def found(cls, model: NoiseModel) -> KnownNoise:
-        """Return noise found from the FRFs; assumed where they do not show it, or where it is rounding."""
+        """Return noise estimated from the FRFs; assumed if they do not show it, or if it is rounding."""
         is_assumed = model.source == "none" or model.level < _LEAST_LEVEL
         level = _ASSUMED_LEVEL if is_assumed else model.level
         return cls(level, model.inflation, is_assumed, model.outlying, model, calibration=model.calibration)
@@ -174,10 +174,11 @@ class SmoothedFrfs(NamedTuple):
     Attributes
     ----------
     smooth : ndarray, shape (n_freq, n_o, n_i)
-        m/N.
+        Smooth FRFs, m/N.
     variance : ndarray, shape (n_freq, n_o, n_i)
-        E|e|^2 of the measured FRFs, (m/N)^2; inf where nothing was measured.
+        Noise variance E|e|^2 of the measured FRFs, (m/N)^2; inf if nothing was measured.
     noise : KnownNoise
+        Noise of the FRFs.
     """
 
     smooth: ComplexArray
@@ -193,18 +194,18 @@ def without_mass(
     Parameters
     ----------
     freq : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     h : ndarray, shape (n_freq, n_o, n_i)
-        m/N.
+        Measured receptances, m/N.
     mass : float or None
-        kg; None to find it, 0 for none.
+        Mass, kg; None to estimate it, 0 for none.
     is_square, is_translation : bool
         Whether responses and forces are the same points, all measured, and all of them translations.
 
     Raises
     ------
     ValueError
-        A mass is given, but the receptances at the points where the sensor stands were not measured.
+        A mass is given, but the receptances at the points of the sensor were not measured.
     """
     if mass:
         if not (is_square and is_translation):
@@ -223,7 +224,7 @@ def without_mass(
 def noise_of_matrix(freq: FloatArray, h: ComplexArray, options: NoiseOptions, *, reciprocal: bool) -> SmoothedFrfs:
     """Return smooth FRFs and noise of a matrix of FRFs, all measured; a level is relative to the smooth FRFs."""
     stated = options.stated()
-    # What is found below takes off what set-ups differ by as errors of channels, but does not know it as theirs.
+    # The estimate below removes differences between set-ups as errors of channels, without attributing them to set-ups.
     is_apart = options.noise is not None or options.setups is not None
     calibration = options.calibration(freq, h, reciprocal=reciprocal) if is_apart else None
     like = options.like.smooth if isinstance(options.like, NoiseModel) else options.like
@@ -246,13 +247,13 @@ def noise_of_matrix(freq: FloatArray, h: ComplexArray, options: NoiseOptions, *,
         if options.setups is not None:
             known = replace(known, calibration=calibration)
         if model.source == "residual" and not model.smooth.is_smooth:
-            # What a rational function leaves of FRFs that it meets but for so little is no noise, either.
+            # A tiny residual of a rational function is no noise, either.
             known = replace(known, level=_ASSUMED_LEVEL, is_assumed=True)
         variance = _relative_variance(model.smooth.h, _ASSUMED_LEVEL if known.is_assumed else _LEAST_LEVEL)
         if not known.is_assumed:
             np.maximum(model.variance, variance, out=variance)
         del model
-    # Other realisations start from these; of a long sweep they would take too much memory.
+    # Fits of further realisations start from these; for a long sweep they would take too much memory.
     if is_long(len(freq)):
         known, smooth = replace(known, model=None, smooth=None), found.h
     else:
@@ -286,7 +287,7 @@ def _smooth_by_stated(
 def _smooth_like(
     freq: FloatArray, h: ComplexArray, variance: FloatArray, like: SmoothFrfs | None, *, reciprocal: bool
 ) -> SmoothFrfs | None:
-    """Return smooth FRFs with the poles of others, relocated; None where these leave more than of the others."""
+    """Return smooth FRFs with the poles of others, relocated; None if these leave a larger residual."""
     if like is None or not like.is_smooth or is_long(len(freq)):  # pieces have no common poles
         return None
     search = OrderSearch(patience=0)
@@ -302,6 +303,7 @@ def noise_of_channels(
     Parameters
     ----------
     freq : ndarray, shape (n_freq,)
+        Frequencies, Hz.
     h : ndarray, shape (n_freq, n_o, n_i)
     shown : ndarray of bool, shape (n_o, n_i)
         FRFs that were measured.
@@ -321,7 +323,7 @@ def noise_of_channels(
         calibration = options.calibration(freq, measured, reciprocal=reciprocal)
         known = KnownNoise.given(np.nan, calibration, stated=stated)
         return SmoothedFrfs(measured, np.where(kept, variance, np.inf), known)
-    # Of a square matrix FRFs that are zero by symmetry may stay: reciprocity says more of the noise.
+    # In a square matrix, FRFs that are zero by symmetry may stay: reciprocity gives more information on the noise.
     taken = shown if reciprocal else kept
     rows, columns = np.flatnonzero(taken.any(axis=1)), np.flatnonzero(taken.any(axis=0))
     is_block = bool(taken[np.ix_(rows, columns)].all())
@@ -354,8 +356,8 @@ def noise_of_channels(
 
 
 def _near(smooth: ComplexArray, h: ComplexArray, variance: FloatArray) -> ComplexArray:
-    """Put the measured FRFs in place of the smooth ones on lines that smoothing misses by more than their noise."""
-    # Entries that are zero by symmetry hold rounding.
+    """Return smooth FRFs, with measured FRFs on lines where smoothing misses these by more than their noise."""
+    # Entries that are zero by symmetry contain rounding.
     shown = (smooth != 0).any(axis=0)
     for own in line_slices(len(h)):
         squares = (abs(h[own] - smooth[own]) ** 2 / variance[own])[:, shown].mean(axis=1)
@@ -376,7 +378,7 @@ def _relative_variance(h: ComplexArray | FloatArray, level: float) -> FloatArray
 
 
 def _stated_variance(freq: FloatArray, h: ComplexArray | FloatArray, stated: StatedNoise) -> FloatArray:
-    """Return the variance of FRFs by the parts of their noise."""
+    """Return the variance of FRFs from the parts of their noise."""
     variance = _relative_variance(h, stated.relative)
     variance += stated.floor_variance(freq)[:, None, None]
     return variance
@@ -392,13 +394,13 @@ def noise_about(squares: FloatArray, size: FloatArray, shape: FloatArray) -> tup
     size : ndarray, shape (n_entries, n_freq)
         |h|^2 of the fitted FRFs.
     shape : ndarray, shape (n_freq,)
-        Variance by the floor, but for a factor.
+        Variance by the floor, up to a common factor.
 
     Notes
     -----
-    The variance has a relative part and a floor, the latter only if the squares clearly show it: at antiresonances a
+    The variance has a relative part and a floor, and a floor only if the squares clearly show it: at antiresonances a
     small FRF may contain most information of all, which a floor would hide. One floor of all entries is preferred to
-    floors of their own that hardly describe the squares better: few lines of an entry show its own.
+    floors of single entries that hardly describe the squares better, because few lines of an entry show its floor.
     """
     size = np.maximum(size, _TINY)
     relative, floor = noise_parts(squares / shape, np.stack([size / shape, np.ones_like(size)]), common=True)

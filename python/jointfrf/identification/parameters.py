@@ -1,4 +1,4 @@
-"""All parameters of a fit in one vector, and the coordinates in which they are sought."""
+"""All parameters of a fit in one vector, and the coordinates of the search."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ __all__ = [
     "with_dampers",
 ]
 
-#: Errors that nobody asked for by name: of modal matrices and mode shapes of a part, of the gain of a response, of a
-#: force, of all FRFs.
+#: Unnamed errors of models and gains: modal matrices and mode shapes of a part; gain of a response, of a force, of all
+#: FRFs.
 ErrorOrigin = Literal["error", "shape-error", "response-error", "force-error", "common-error"]
-#: What a parameter belongs to; a mean is that of several joints.
+#: Owner of a parameter; "mean" is the mean of several joints.
 ParameterOrigin = Literal["joint", "mean", "part", "attachment", "response", "force"] | ErrorOrigin
 
 
-#: Stiffnesses of the joint are sought within this factor of the stiffness that the substructures have there; other
-#: logarithms without a limit within this factor of their nominal value.
+#: Ratio to the stiffness of the substructures at the joint within which its stiffnesses are sought; also the ratio to
+#: the nominal value for other logarithms without a bound.
 _WIDEST = 1e6
-#: No step changes a logarithm, or standard deviations of a prior, by more than this; nor does the first of a profile a
-#: logarithm.
+#: Longest step of a logarithm, or of a parameter in standard deviations of its prior; also of the first step of a
+#: profile.
 _LONGEST, _LONGEST_REACH = 1.0, 1.5
 
 
-#: Standard deviation of the prior of a loss factor: hardly a joint has one of 1.
+#: Standard deviation of the prior of a loss factor: joints hardly reach 1.
 _LARGEST_LOSS = 1.0
-#: Loss factor by which damping that starts at zero is first changed; of a damper at this angular frequency, rad/s.
+#: Loss factor of the first change of damping that starts at zero; for a damper at this angular frequency, rad/s.
 _FIRST_LOSS, _FIRST_OMEGA = 0.01, 1000.0
 
 
@@ -52,24 +52,30 @@ class FitParameter(NamedTuple):
     Attributes
     ----------
     name, unit : str
+        Name and unit.
     origin : str
-        What it belongs to.
+        Owner: joint, part, attachment, response or force.
     place : tuple
-        Its place there: its number in the joint; number of the attachment and of its number; names of the part and of
-        the unknown; number of a channel.
+        Place in its owner:
+
+        - number in the joint
+        - number of the attachment and of the quantity
+        - names of the part and of the unknown
+        - number of a channel
     value : float
-        Where the fit may start, and the mean of the prior.
+        Initial value, and mean of the prior.
     std : float or None
         Standard deviation of the prior.
     lower, upper : float
+        Bounds.
     is_log : bool
-        Whether it is sought as its logarithm.
+        Whether the coordinate is the logarithm.
     is_free : bool
         Whether it is fitted.
     like : int or None
-        Place among all of the parameter that it equals.
+        Place of the equal parameter in the vector of all.
     damps : int or None
-        Place among all of the stiffness that the prior of a hysteretic damping is relative to.
+        Place of the stiffness that the prior of a hysteretic damping is relative to, in the vector of all.
     size : float
         Unit of the coordinate of a parameter that starts at zero without a prior.
     """
@@ -90,7 +96,7 @@ class FitParameter(NamedTuple):
 
     @property
     def is_error(self) -> bool:
-        """Whether it is an error of a model or of a gain, which nobody asked for by name."""
+        """Whether it is an error of a model or of a gain, without a name for the user."""
         return self.origin in get_args(ErrorOrigin)
 
 
@@ -104,9 +110,9 @@ class CommonMean(NamedTuple):
     members : tuple of int
         Places of the parameters.
     std : float
-        Standard deviation of the members, of their logarithms where these are sought.
+        Standard deviation of the members, or of their logarithms if these are the coordinates.
     relative : float or None
-        Where the spread was given: `std`, or its ratio to the mean.
+        Given spread: `std`, or its ratio to the mean; None if no spread was given.
     """
 
     mean: int
@@ -117,11 +123,12 @@ class CommonMean(NamedTuple):
 
 @dataclass(frozen=True)
 class ParameterVector:
-    """The parameters of a fit; vectors contain the values of all, coordinates only the free ones.
+    """Parameters of a fit; vectors contain the values of all, coordinates only the free ones.
 
     Attributes
     ----------
     all : tuple of FitParameter
+        All parameters.
     means : tuple of CommonMean
         Priors that several parameters share.
     """
@@ -141,22 +148,22 @@ class ParameterVector:
 
     @cached_property
     def n_shown(self) -> int:
-        """How many of the free ones, the first ones, are no errors of the models."""
+        """Number of free parameters without errors of the models, which come last."""
         return sum(not one.is_error for one in self.fitted)
 
     @cached_property
     def values(self) -> FloatArray:
-        """Values of all to begin with."""
+        """Initial values of all parameters."""
         return np.array([one.value for one in self.all])
 
     @cached_property
     def is_log(self) -> NDArray[np.bool_]:
-        """Which of the free ones are sought as logarithms."""
+        """Which free parameters have a logarithm as coordinate."""
         return np.array([one.is_log for one in self.fitted], bool)
 
     @cached_property
     def scale(self) -> FloatArray:
-        """Unit of the coordinate of each free one that is not a logarithm."""
+        """Unit of the coordinate of each free parameter without a logarithm."""
         return np.array([one.std or abs(one.value) or one.size for one in self.fitted])
 
     def to_coordinates(self, values: FloatArray) -> FloatArray:
@@ -175,12 +182,12 @@ class ParameterVector:
 
     @cached_property
     def _alike(self) -> tuple[list[int], list[int]]:
-        """Places of the parameters that equal others, and of these."""
+        """Places of the parameters that equal another one, and the places of these."""
         own = [(i, one.like) for i, one in enumerate(self.all) if one.like is not None]
         return [i for i, _ in own], [like for _, like in own]
 
     def with_means(self, values: FloatArray, *, at_mean: bool = False) -> FloatArray:
-        """Return values of all with the means of those members that they have; and, if wanted, the members there."""
+        """Return values of all with the means of their members; with `at_mean`, also the members at their mean."""
         found = values.copy()
         for one in self.means:
             own, members = self.all[one.mean], values[list(one.members)]
@@ -201,12 +208,12 @@ class ParameterVector:
 
     @cached_property
     def limits(self) -> tuple[FloatArray, FloatArray]:
-        """Smallest and largest values of the free ones."""
+        """Smallest and largest values of the free parameters."""
         return np.array([one.lower for one in self.fitted]), np.array([one.upper for one in self.fitted])
 
     @cached_property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """The same in coordinates, those of logarithms finite."""
+        """Smallest and largest coordinates; finite for logarithms."""
         value = np.where(self.is_log, self.values[self.free], 1)
         lower, upper = (np.where(self.is_log, limit, 1) for limit in self.limits)
         lower, upper = np.where(lower > 0, lower, value / _WIDEST), np.where(upper < np.inf, upper, value * _WIDEST)
@@ -214,7 +221,7 @@ class ParameterVector:
         return np.where(self.is_log, logs[0], linear[0]), np.where(self.is_log, logs[1], linear[1])
 
     def longest(self, x: FloatArray) -> FloatArray:
-        """Return the largest steps of a minimiser: damping may be anything, but not at once."""
+        """Return the largest steps of a minimiser: damping is unbounded, but not a step of it."""
         of_prior = np.minimum(self.scale / np.where(self.is_log, self.values[self.free], self.scale), 1)
         return _LONGEST * np.where(self.has_prior, of_prior, np.where(self.is_log, 1, np.maximum(abs(x), 1)))
 
@@ -223,28 +230,28 @@ class ParameterVector:
         return float(self._own(x)[i])
 
     def end(self, i: int, sign: int) -> float:
-        """Return what one of them runs to where it has no limit below (-1) or above (1)."""
-        if self.is_log[i] and self.fitted[i].origin in ("joint", "mean"):  # their limits are those of the search
+        """Return the limit of a free parameter without a bound below (-1) or above (1)."""
+        if self.is_log[i] and self.fitted[i].origin in ("joint", "mean"):  # their bounds are the limits of the search
             return np.inf if sign > 0 else 0.0
         return float(self.limits[sign > 0][i])
 
     def longest_reach(self, i: int) -> float:
-        """Return how far from a minimum the limit of one of them is sought first at most."""
+        """Return the largest distance from a minimum for the first search of a limit."""
         return _LONGEST_REACH if self.is_log[i] else np.inf
 
     @cached_property
     def has_prior(self) -> NDArray[np.bool_]:
-        """Which of the free ones have a prior."""
+        """Which free parameters have a prior."""
         return np.array([one.std is not None for one in self.fitted], bool)
 
     @cached_property
     def _std(self) -> FloatArray:
-        """Standard deviations of the priors of the free ones, inf without one."""
+        """Standard deviations of the priors of the free parameters, inf without a prior."""
         return np.array([one.std or np.inf for one in self.fitted])
 
     @cached_property
     def _shared(self) -> FloatArray:
-        """Coordinates of members less that of their mean, over their standard deviation, as a matrix."""
+        """Coordinates of members minus the coordinate of their mean, over their standard deviation, as a matrix."""
         rows, place = [], {int(i): at for at, i in enumerate(self.free)}
         for one in self.means:
             for member in one.members:
@@ -256,14 +263,14 @@ class ParameterVector:
 
     @cached_property
     def _dampers(self) -> tuple[NDArray[np.intp], NDArray[np.intp], list[int]]:
-        """Places, among the free ones, of hysteretic dampings; of their stiffnesses, -1 if fixed; and among all."""
+        """Places of dampings h and of their stiffnesses (-1 if fixed) among the free, and of these among all."""
         place = {int(i): at for at, i in enumerate(self.free)}
         own = [(at, one.damps) for at, one in enumerate(self.fitted) if one.damps is not None]
         of = [place.get(damps, -1) for _, damps in own if damps is not None]
         return np.array([at for at, _ in own], np.intp), np.array(of, np.intp), [k for _, k in own if k is not None]
 
     def pulls(self, x: FloatArray) -> FloatArray:
-        """Return by how many standard deviations of its prior each free value is off, 0 without one; then members."""
+        """Return the distance of each free value from its prior in standard deviations, 0 without one; then members."""
         own = self._own(x)
         found = (own - self.values[self.free]) / self._std
         at, _, places = self._dampers
@@ -272,7 +279,7 @@ class ParameterVector:
         return np.concatenate([found, self._shared @ x])
 
     def pull_slopes(self, x: FloatArray) -> FloatArray:
-        """Return their derivatives by the coordinates, a row each."""
+        """Return the derivatives of the pulls by the coordinates, one row each."""
         slope = self.slope(x)
         found = np.diag(slope / self._std)
         at, of, places = self._dampers
@@ -299,11 +306,11 @@ class ParameterVector:
         return found
 
     def of_joint(self) -> ParameterVector:
-        """Return the same with the parameters of the joint free only."""
+        """Return the vector in which only the parameters of the joint are free."""
         return ParameterVector(tuple(one._replace(is_free=one.is_free and one.origin == "joint") for one in self.all))
 
     def of_equal_joints(self) -> ParameterVector | None:
-        """Return the same with all joints of the same laws equal; None where there are none but those that are."""
+        """Return the vector with equal parameters for all joints of the same laws; None if there are no such joints."""
         first: dict[str, int] = {}
         found, is_new = list(self.all), False
         for i, one in enumerate(self.all):
@@ -325,7 +332,8 @@ class ParameterVector:
 def with_dampers(parameters: Sequence[FitParameter], joint: LawJoint) -> list[FitParameter]:
     """Return parameters of a joint whose springs supply no energy: damping of one DOF is at least 0.
 
-    Hysteretic damping has a prior relative to the stiffness: FRFs far from a joint hardly tell a loss factor above 1.
+    Hysteretic damping has a prior relative to the stiffness, because FRFs far from a joint hardly restrict a loss
+    factor above 1.
     """
     found, at = list(parameters), {one.name: i for i, one in enumerate(parameters)}
     for i, one in enumerate(joint.quantities):
@@ -340,13 +348,16 @@ def with_dampers(parameters: Sequence[FitParameter], joint: LawJoint) -> list[Fi
 
 
 def joint_vector(joint: LawJoint, fixed: Sequence[str], joint_stiffness: FloatArray) -> ParameterVector:
-    """Put the parameters of a joint together.
+    """Return the parameters of a joint as a vector.
 
     Parameters
     ----------
     joint : LawJoint
-    fixed, joint_stiffness
-        As in `parameter_vector`.
+        Joint to fit.
+    fixed : sequence of str
+        Names of parameters that keep their value.
+    joint_stiffness : ndarray
+        Stiffness of the substructures at the joint, N/m or N m/rad; see `parameter_vector`.
     """
     names = joint.names
     for name in fixed:
@@ -359,7 +370,7 @@ def joint_vector(joint: LawJoint, fixed: Sequence[str], joint_stiffness: FloatAr
 
 
 def _of_joint(one: JointQuantity, place: int, is_free: bool, size: Mapping[str, float]) -> FitParameter:
-    """Return a parameter of the joint; a stiffness or a time that cannot be negative is sought as its logarithm."""
+    """Return a parameter of the joint; the coordinate of a positive stiffness or time is its logarithm."""
     kind, lower, upper = one.field.kind, one.field.lower, one.field.upper
     is_log = kind in ("stiffness", "time") and lower >= 0
     if is_log and kind == "stiffness":

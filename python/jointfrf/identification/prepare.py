@@ -1,4 +1,4 @@
-"""What `identify` is given, checked: what all methods share."""
+"""Checked arguments of `identify` that all methods share."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = [
     "as_transform",
 ]
 
-#: What a user may write for the bands.
+#: Types that the argument `bands` accepts.
 BandsOfDofs = None | Band | Sequence[Band] | Mapping[str, Band | Sequence[Band]]
 
 
@@ -39,8 +39,9 @@ class MeasuredFrfs:
     Attributes
     ----------
     freq_hz : ndarray, shape (n_freq,)
+        Frequencies, Hz.
     h : ndarray, shape (n_freq, m_r, m_f)
-        Responses by forces, m/N.
+        Receptances, responses by forces, m/N.
     """
 
     freq_hz: FloatArray

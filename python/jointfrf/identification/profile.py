@@ -14,43 +14,43 @@ from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["FunctionIntervals", "Intervals", "ProfileIntervals", "ProfiledCoordinates"]
 
-#: Squares on the way of the linear prediction that differ less than this from those of a parabola need no profile, and
-#: how near to a limit squares must come, relative to it; the latter where squares cost little.
+#: Relative difference of the squares along the linear prediction from a parabola below which no profile is needed, and
+#: relative tolerance of the squares at a limit; the third value is the tolerance if squares are cheap.
 _PARABOLA, _NEAR, _PRECISE = 0.1, 0.03, 2e-4
-#: Where squares stay below this share of a limit without a minimisation, the next reach, by the parabola, is at least
+#: If squares stay below this share of a limit without a minimisation, the next reach, by the parabola, is at least
 #: twice as far.
 _FAR_BELOW = 0.25
-#: Steps in search of a limit, and where squares cost little.
+#: Maximum number of steps in search of a limit; the second value applies if squares are cheap.
 _STEPS, _MANY_STEPS = 12, 30
-#: Linearisations at a value of the parameter that is held, and what a step promises at the last one.
+#: Number of linearisations with one parameter fixed, and the predicted decrease at the last one.
 _HELD_STEPS, _HELD_LEAST = 24, 1e-2
-#: Step of a difference, in standard errors, and how far from its value a function may be that is held, likewise.
+#: Step of a difference, in standard errors, and tolerance of the value of a fixed function, in the same unit.
 _SLOPE, _HELD = 1e-3, 1e-2
-#: What brackets a limit may be as narrow as this share of how near squares must come to it.
+#: Width of a bracket relative to the tolerance of the squares at which the search ends.
 _WALL = 0.3
-#: A limit is sought between these shares of what brackets it.
+#: Shares of the bracket between which a limit is sought.
 _INSIDE = np.array([0.1, 0.9])
 
 
-#: From a function of the values of all parameters, the numbers of those that it depends on, and a probability.
+#: Function of the values of all parameters, the numbers of those that it uses, and a probability.
 FunctionIntervals = Callable[[Callable[[FloatArray], float], NDArray[np.intp], float], tuple[float, float] | None]
 
 
 class ProfiledCoordinates(Protocol):
-    """Coordinates of parameters, each with a profile of its own."""
+    """Coordinates of parameters of which each has a profile."""
 
     def value(self, i: int, x: FloatArray) -> float:
-        """Return one parameter of all coordinates."""
+        """Return the value of parameter i at coordinates x."""
 
     def end(self, i: int, sign: int) -> float:
-        """Return what a parameter runs to where its coordinate has no limit below (-1) or above (1)."""
+        """Return the limit of a parameter whose coordinate is unbounded below (-1) or above (1)."""
 
     def longest_reach(self, i: int) -> float:
-        """Return how far from the minimum a limit is sought first at most."""
+        """Return the largest distance from the minimum for the first search of a limit."""
 
 
 class _ProfilePoint(NamedTuple):
-    """Point of a profile: the distance of its parameter from the minimum, coordinates, their change with that."""
+    """Point of a profile: distance of its parameter from the minimum, coordinates, derivative of the coordinates."""
 
     reach: float
     x: FloatArray
@@ -63,22 +63,24 @@ class ProfileIntervals:
     Parameters
     ----------
     squares : Squares
+        Objective.
     coordinates : ProfiledCoordinates
+        Coordinates of the parameters.
     x, cost
-        The minimum.
+        Coordinates and squares at the minimum.
     covariance : ndarray, shape (p, p)
-        Of the coordinates, for independent noise as known.
+        Covariance of the coordinates for independent noise of the given level.
     factor : float
-        By how much variances exceed that.
+        Ratio of the variances to this covariance.
     least : callable, optional
-        ``least(start, i)`` returns the squares minimised over all coordinates but number i, where that costs little:
-        limits are then found precisely.
+        Function ``least(start, i)`` that returns the squares minimised over all coordinates except number i, if that is
+        cheap: limits are then precise.
 
     Notes
     -----
-    A limit is where the squares, minimised over all other parameters, exceed their minimum by the quantile of chi^2
-    times the factor. The others are first taken to follow linearly; where the squares are a parabola on that way, the
-    limit follows from it without a minimisation.
+    At a limit the squares, minimised over all other parameters, exceed their minimum by the quantile of chi^2
+    multiplied by the factor. All other parameters first follow linearly. If the squares are a parabola along this line,
+    the limit follows from it without a minimisation.
     """
 
     def __init__(
@@ -98,16 +100,16 @@ class ProfileIntervals:
         self.parabola, self.near = (_PARABOLA, _NEAR) if least is None else (_PRECISE, _PRECISE)
 
     def of(self, i: int, probability: float) -> tuple[float, float]:
-        """Return the interval of one parameter, by its number, that contains the true one with this probability."""
+        """Return the interval of parameter number i with this coverage probability."""
         low, high = sorted((self.limit(i, -1, probability), self.limit(i, 1, probability)))
         return low, high
 
     def limit(self, i: int, sign: int, probability: float) -> float:
-        """Return the limit of one parameter below (-1) or above (1) in its coordinate, or its end without one."""
+        """Return the limit of one parameter below (-1) or above (1) in its coordinate, or its end without a limit."""
         return self._limit(i, sign, float(special.ndtri((1 + probability) / 2)) ** 2 * self.factor * self.squares.unit)
 
     def _limit(self, i: int, sign: int, limit: float) -> float:
-        """Return where the squares exceed their minimum by a limit."""
+        """Return the distance at which the squares exceed their minimum by a limit."""
         bound, end = self.squares.bounds[sign > 0][i], self.coordinates.end(i, sign)
         own = float(self.covariance[i, i])
         if not (np.isfinite(own) and own > 0):
@@ -115,7 +117,7 @@ class ProfileIntervals:
         along, variance = self._followed(i, self.covariance / self.squares.unit)
         reach = min(float(np.sqrt(limit * variance)), self.coordinates.longest_reach(i))
         low, high, unsure = 0.0, np.inf, np.inf
-        below, above = 0.0, np.inf  # roots of the excess there, over that of the limit
+        below, above = 0.0, np.inf  # roots of the excess over the excess at the limit
         points = [_ProfilePoint(0.0, self.x, sign * along)]
         quadratic = reach**2 / variance
         for step in range(self.steps):
@@ -126,7 +128,7 @@ class ProfileIntervals:
             if step == 0 and abs(excess / quadratic - 1) < self.parabola:
                 return self._value(i, sign * reach * np.sqrt(limit / excess))
             if excess > _FAR_BELOW * limit:
-                # The profile is no higher than squares anywhere on the way, nor than those with all others as they are.
+                # The profile is no higher than the squares on this line, or at the present other coordinates.
                 excess = self._excess(self.squares.cost(self._there(np.eye(1, self.x.size, i)[0] * sign * reach)))
             if excess > _FAR_BELOW * limit and self.least is not None:
                 excess = self._excess(self.least(there, i))
@@ -134,13 +136,13 @@ class ProfileIntervals:
                 found = self._minimised(there, i)
                 excess = self._excess(found.cost)
                 if excess > limit and self._excess(found.cost - 2 * found.promised) < limit:
-                    # The squares may still come below the limit here: from nearer they are minimised sooner.
+                    # The profile may still be below the limit here; a start nearer to it converges sooner.
                     unsure, reach = reach, (low + reach) / 2
                     continue
                 if np.isfinite(found.information).all():
                     nearby = self._followed(i, inverse_information(found.information / self.squares.unit))[0]
                     points.append(_ProfilePoint(reach, found.x, sign * nearby))
-            # Beyond a parameter that cannot be negative squares rise like a wall.
+            # Beyond the bound of a positive parameter the squares rise steeply.
             if abs(excess / limit - 1) < self.near or high - low < _WALL * self.near * reach:
                 break
             if excess < limit:
@@ -159,9 +161,9 @@ class ProfileIntervals:
         return self._value(i, sign * reach)
 
     def _followed(self, i: int, covariance: FloatArray) -> tuple[FloatArray, float]:
-        """Return the change of all coordinates for a change of number i by 1, and the variance of number i.
+        """Return the change of all coordinates for a unit change of number i, and the variance of number i.
 
-        Coordinates that the squares hardly determine stay: derivatives say nothing about places that are so far off.
+        Coordinates that the squares hardly determine stay: derivatives do not predict such distant values.
         """
         longest = np.array([self.coordinates.longest_reach(j) for j in range(self.x.size)])
         follows = (np.diagonal(covariance) <= longest**2) | (np.arange(self.x.size) == i)
@@ -189,9 +191,9 @@ class ProfileIntervals:
         return there, excess
 
     def of_function(self, function: Callable[[FloatArray], float], probability: float) -> tuple[float, float] | None:
-        """Return the interval of a function of the coordinates: the squares are minimised with the function held.
+        """Return the interval of a function of the coordinates by minimising the squares with the function fixed.
 
-        None where it does not change with the coordinates, or has no derivative.
+        None if it does not change with the coordinates, or has no derivative.
         """
         best, x = function(self.x), self.x
         steps = _SLOPE * np.sqrt(np.maximum(np.diagonal(self.covariance), 0)) * np.eye(x.size)
@@ -210,7 +212,7 @@ class ProfileIntervals:
             if abs(excess / limit - 1) < self.parabola:
                 ends.append(function(self._there(sign * reach * np.sqrt(limit / excess) * along)))
                 continue
-            minimised = sign * along  # the way to a minimum with the function held, for a change of it of 1
+            minimised = sign * along  # change of the minimum for a change of the fixed function by 1
             for _ in range(_STEPS):
                 held = _HeldFunction(self.squares, function, best + sign * reach, variance)
                 starts = [self._there(reach * way) for way in (minimised, sign * along)]
@@ -225,7 +227,7 @@ class ProfileIntervals:
                     min(guess, 4 * reach) if high == np.inf else float(np.clip(guess, *(low + (high - low) * _INSIDE)))
                 )
             else:
-                if low == 0:  # no value was found that is not excluded: the squares were not minimised
+                if low == 0:  # no accepted value was found: the squares were not minimised
                     return None
             ends.append(best + sign * reach if high < np.inf or excess > (1 - 2 * self.near) * limit else sign * np.inf)
         return ends[0], ends[1]
@@ -234,7 +236,7 @@ class ProfileIntervals:
         found = minimise(self.squares, start, i, _HELD_STEPS, _HELD_LEAST)
         if np.isfinite(found.cost):
             return found
-        # The linear prediction of the others left the range in which there is a model.
+        # The linear prediction of the other coordinates left the range of the model.
         alone = np.where(np.arange(start.size) == i, start, self.x)
         return minimise(self.squares, alone, i, _HELD_STEPS, _HELD_LEAST)
 
@@ -251,7 +253,7 @@ class ProfileIntervals:
 
 
 class _HeldFunction:
-    """Squares with a function of the coordinates held at a value, by squares that rise fast with its distance."""
+    """Squares with a function of the coordinates fixed at a value, by a penalty on its distance."""
 
     def __init__(
         self, squares: Squares, function: Callable[[FloatArray], float], value: float, variance: float
@@ -265,7 +267,7 @@ class _HeldFunction:
         return self.squares.cost(x) + self.weight * (self.function(x) - self.value) ** 2
 
     def linearised(self, x: FloatArray) -> NormalEquations:
-        """Return it with its derivatives; the function's by differences."""
+        """Return the sum with its derivatives; derivatives of the function by differences."""
         at = self.squares.linearised(x)
         if not np.isfinite(at.cost):
             return at
@@ -286,11 +288,12 @@ class Intervals:
     Parameters
     ----------
     names : sequence of str
+        Names of the parameters.
     limits : callable
-        ``limits(i, probability)`` returns the interval of parameter i.
+        Function ``limits(i, probability)`` that returns the interval of parameter i.
     of_function : callable
-        ``of_function(function, used, probability)`` returns that of a function of the values of all, which depends on
-        those with the numbers `used`; None where it follows from the covariance.
+        Function ``of_function(function, used, probability)`` that returns the interval of a function of all values,
+        which depends on the parameters with the numbers `used`; None if it follows from the covariance.
     """
 
     def __init__(
@@ -300,13 +303,13 @@ class Intervals:
         self._known: dict[tuple[str, float], tuple[float, float]] = {}
 
     def of(self, name: str, probability: float) -> tuple[float, float]:
-        """Return the interval of one parameter that contains the true one with the given probability."""
+        """Return the interval of one parameter with the given coverage probability."""
         if (name, probability) not in self._known:
             self._known[name, probability] = self._limits(self.names.index(name), probability)
         return self._known[name, probability]
 
     def shared(self, names: Sequence[str], which: NDArray[np.intp]) -> Intervals:
-        """Return the intervals of parameters of equal points: each is that of one of these, by its number."""
+        """Return the intervals of parameters of equal points; `which` has the number of the shared one of each."""
 
         def limits(i: int, probability: float) -> tuple[float, float]:
             return self.of(self.names[which[i]], probability)

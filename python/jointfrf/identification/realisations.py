@@ -30,14 +30,14 @@ __all__ = ["FitStart", "identify_realisations", "viscous_estimate", "viscous_joi
 
 
 class FitStart(NamedTuple):
-    """Where searches begin: what an earlier fit to FRFs of the same structure has found.
+    """Initial values from an earlier fit to FRFs of the same structure.
 
     Attributes
     ----------
     estimate : JointEstimate
-        The joint, and the FRFs that fit it.
+        Joint, and the FRFs that fit it.
     noise : NoiseModel or None
-        With the poles of the smooth FRFs.
+        Noise, with the poles of the smooth FRFs.
 
     Examples
     --------
@@ -66,23 +66,26 @@ class FitStart(NamedTuple):
         damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms] = "auto",
         cross: CrossTerms = "zero",
     ) -> FitStart:
-        """Fit one set of FRFs.
+        """Fit one set of FRFs and return it as a start for further sets.
 
         Parameters
         ----------
-        freq_hz, dofs, damping, cross
-            As in `identify_realisations`.
+        freq_hz : array_like, shape (n_freq,)
+            Frequencies, Hz.
         gamma : array_like, shape (n_freq, 2 n, 2 n)
             Receptances of the same structure, m/N.
+        dofs, damping, cross
+            Options of the fit; see `identify_realisations`.
 
         Returns
         -------
         FitStart
+            Estimate and noise.
 
         Raises
         ------
         ValueError
-            As `identify`.
+            An error of `identify`.
         """
         options = FitOptions(damping, cross, reciprocal=True)
         measured = as_measured(freq_hz, gamma, square=False)
@@ -104,36 +107,41 @@ def identify_realisations(
     reciprocal: bool = True,
     start: FitStart | None = None,
 ) -> Iterator[Fit]:
-    """Identify a joint from each of several sets of FRFs of the same structure.
+    """Identify a joint from each of several sets of FRFs of the same structure, and yield the fits.
 
     Parameters
     ----------
     freq_hz : array_like, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     gammas : iterable of array_like, shape (n_freq, m_r, m_f)
-        Measured receptances, m/N, as `identify` takes them: realisations of noise, repeated measurements.
+        Measured receptances, m/N, see `identify`: realisations of noise, repeated measurements.
     dofs, bands, transform, damping, cross, same, noise, reciprocal
-        As in `identify` with the method "compliance".
+        Options of the fit; see `identify`.
     start : FitStart, optional
-        Where the searches begin, in place of the first set: then a result depends on its own set only, whatever others
-        are in the same call.
+        Initial values in place of the first set. A result then depends on its own set only, whatever sets are in the
+        same call.
 
     Yields
     ------
     Fit
-        One for each set, as it is asked for. Warnings are in its `warnings` and are not issued; the FRFs are not looked
-        at as `check_frfs` does.
+        Fit of one set. Warnings are in its `warnings` and are not issued; there is no data check (`check_frfs`).
 
     Raises
     ------
     ValueError
-        As `identify`.
+        An error of `identify`.
+
+    See Also
+    --------
+    identify : fit of one set of FRFs, with a data check.
+    realisations : polluted FRFs.
+    monte_carlo : mean and covariance of line-by-line methods.
 
     Notes
     -----
-    Each fit stands for itself, by its own noise. What makes a set faster than `identify`: the search for poles of the
-    smooth FRFs, for the noise and for the joint begins at those of the first set, and ends at once where the set is
-    alike.
+    Each fit is independent and uses its own noise. It is faster than `identify` because the search for poles of the
+    smooth FRFs, for the noise and for the joint starts at the result of the first set. The search ends at once if the
+    sets are similar.
 
     Examples
     --------
@@ -167,17 +175,18 @@ def identify_realisations(
 def viscous_joints(
     freq_hz: FloatArray, gammas: Iterable[ComplexArray], dofs: Sequence[str], start: FitStart | None = None
 ) -> FloatArray:
-    """Return stiffness and viscous damping of several sets as `identify_realisations` gives them, and nothing else.
+    """Return stiffness and viscous damping of several sets, without further results of `identify_realisations`.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     gammas : iterable of ndarray, shape (n_freq, 2 n, 2 n)
         Measured receptances of the same structure, m/N.
     dofs : sequence of str
         Names of the n joint DOFs.
     start : FitStart, optional
+        Initial values in place of the first set.
 
     Returns
     -------
@@ -187,7 +196,7 @@ def viscous_joints(
     Raises
     ------
     ValueError
-        As `identify`.
+        An error of `identify`.
     """
     values = []
     for gamma in gammas:
@@ -202,17 +211,18 @@ def viscous_joints(
 def viscous_estimate(
     freq_hz: FloatArray, gamma: ComplexArray, dofs: Sequence[str], start: FitStart | None
 ) -> tuple[FloatArray, FloatArray]:
-    """Return stiffness and viscous damping of one set as `identify_realisations` gives them, without looking further.
+    """Return stiffness and viscous damping of one set with intervals, without further results of a fit.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     gamma : ndarray, shape (n_freq, 2 n, 2 n)
         Measured receptances, m/N.
     dofs : sequence of str
         Names of the n joint DOFs.
     start : FitStart, optional
+        Initial values.
 
     Returns
     -------
@@ -224,7 +234,7 @@ def viscous_estimate(
     Raises
     ------
     ValueError
-        As `identify`.
+        An error of `identify`.
     """
     problem, found, _ = estimated_joint(_viscous_problem(freq_hz, gamma, dofs, start))
     return found.theta, np.array(
@@ -235,7 +245,7 @@ def viscous_estimate(
 def _viscous_problem(
     freq_hz: FloatArray, gamma: ComplexArray, dofs: Sequence[str], start: FitStart | None
 ) -> FitProblem:
-    """Return the fit of springs and dashpots without cross terms, begun at `start`: other noise on the same FRFs."""
+    """Return the fit of springs and dashpots without cross terms from `start`, for further noise on the same FRFs."""
     noise = NoiseOptions(None, like=None if start is None else start.noise)
     options = FitOptions("viscous", "zero", reciprocal=True)
     measured = as_measured(freq_hz, gamma, square=False)

@@ -1,4 +1,4 @@
-"""A fit in a file: plain numbers and text, to be read again with every number exactly as it was."""
+"""A fit in a file: plain numbers and text that reproduce every number exactly."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ from jointfrf.toml.table import TomlTable
 
 __all__ = ["fit_from_dict", "fit_to_dict", "load", "read_record", "save"]
 
-#: Format and version in the first keys of a file. Version 1 had springs alone.
+#: Format and version in the first keys of a file. Version 1 contains only springs.
 _FORMAT, _VERSION = "jointfrf joint", 2
-#: Probabilities of the intervals that are kept: the quartiles, one standard deviation, and what is usually quoted.
+#: Probabilities of the stored intervals: the quartiles, one standard deviation, and the usual ones.
 _PROBABILITIES = (0.5, 0.6827, 0.9, 0.95, 0.99)
 #: Bytes of memory of a frequency line.
 _LINE = 32
 #: Keys that a file of version 1 does not have.
 _OF_VERSION_2 = ("joint", "derived", "responses", "forces", "residual_is_noise", "is_converged", "findings")
 
-#: JSON has neither NaN (null) nor infinity (a text).
+#: JSON has no NaN (null) and no infinity (a text).
 Number = float | Literal["inf", "-inf"] | None
 Pair = tuple[Number, Number]
 
@@ -113,11 +113,12 @@ class _Record(Struct, kw_only=True):
 
 
 class _KnownIntervals:
-    """Intervals of the parameters at some probabilities, as they were found; others cannot be found again.
+    """Intervals of the parameters at stored probabilities; no further interval can be computed.
 
     Parameters
     ----------
     by_probability : dict of float to dict of str to (low, high)
+        Intervals by probability and name.
     """
 
     def __init__(self, by_probability: dict[float, dict[str, tuple[float, float]]]) -> None:
@@ -136,29 +137,45 @@ class _KnownIntervals:
 
 
 def fit_to_dict(fit: Fit, *, probabilities: Sequence[float] | None = None, lines: bool = True) -> dict[str, Any]:
-    """Everything that a fit says as plain numbers and text, ready for JSON; `fit_from_dict` gives the same fit again.
+    """Return a fit as plain numbers and text, ready for JSON; `fit_from_dict` gives the same fit again.
 
     Parameters
     ----------
     fit : Fit
+        Fit to store.
     probabilities : sequence of float, optional
-        Probabilities of the intervals that are kept beside 0.5, 0.6827, 0.9, 0.95 and 0.99: where intervals follow from
-        the profile of the likelihood they cannot be found again without the FRFs.
+        Probabilities of stored intervals in addition to 0.5, 0.6827, 0.9, 0.95 and 0.99. Intervals from the profile of
+        the likelihood cannot be computed again without the FRFs.
     lines : bool
-        Whether K*(w) of each line is kept, two numbers for each of the n n entries.
+        Whether K*(w) of each line is stored, two numbers for each of the n n entries; default True.
 
     Returns
     -------
     dict
-        ``"format"``, ``"format_version"``, and under ``"parameters"`` value, unit, standard error and 95 % interval of
-        each, under ``"derived"`` loss factors, under ``"seen"`` what virtual points see; in an interval there, None is
-        an open end. Elsewhere None is NaN, ``"inf"`` infinity.
+        Keys ``"format"`` and ``"format_version"``; ``"parameters"`` with value, unit, standard error and 95 % interval
+        of each; ``"derived"`` with loss factors. ``"seen"`` has stiffnesses between virtual points. None in an interval
+        is an unbounded end. Elsewhere None is NaN, and ``"inf"`` is infinity.
 
     Raises
     ------
     ValueError
         A probability is not between 0 and 1, or not known to a fit that was loaded; a user-defined law, which a file
-        cannot hold.
+        cannot contain.
+
+    See Also
+    --------
+    fit_from_dict : the fit of such a dict.
+    save : the same in a JSON file.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> freq = np.linspace(0.5, 10, 100)
+    >>> h = jf.chain([5], [2500], [3], ground="start").receptance(freq)
+    >>> gamma = jf.couple(h, h, jf.Joint([2000.0], [3.0]).dynamic_stiffness(freq), [0], [0])
+    >>> content = jf.fit_to_dict(jf.identify(freq, jf.pollute(gamma, 0.02, seed=1), ["x"], damping="viscous"))
+    >>> list(content["parameters"])
+    ['k_x', 'c_x']
     """
     check_type("fit", fit, Fit)
     intervals, errors = fit.confidence_interval(0.95), fit.std_error
@@ -234,7 +251,7 @@ def _number(value: Number) -> float:
 
 
 def _plain_intervals(fit: Fit, probabilities: Sequence[float] | None) -> dict[str, dict[str, Pair]] | None:
-    """Return the intervals of a method that has its own; others follow from the covariance."""
+    """Return the intervals if the method computes them; without these they follow from the covariance."""
     if fit.intervals is None:
         return None
     if isinstance(fit.intervals, _KnownIntervals) and probabilities is None:
@@ -250,7 +267,7 @@ def _plain_intervals(fit: Fit, probabilities: Sequence[float] | None) -> dict[st
 
 
 def _plain_lines(freq_hz: FloatArray) -> list[float] | _Grid:
-    """Return frequency lines by their ends and number if that gives the same numbers."""
+    """Return frequency lines as first, last and number if that reproduces them exactly."""
     first, last, number = float(freq_hz[0]), float(freq_hz[-1]), freq_hz.size
     if number > 2 and np.array_equal(np.linspace(first, last, number), freq_hz):
         return _Grid(first, last, number)
@@ -258,21 +275,28 @@ def _plain_lines(freq_hz: FloatArray) -> list[float] | _Grid:
 
 
 def fit_from_dict(content: dict[str, Any]) -> Fit:
-    """Make a fit of what `fit_to_dict` wrote.
+    """Return the fit of a dict from `fit_to_dict`.
 
     Parameters
     ----------
     content : dict
+        Result of `fit_to_dict`.
 
     Returns
     -------
     Fit
-        The same numbers; intervals at the probabilities kept, and no FRFs: no page can be made of it.
+        Fit with the same numbers and intervals at the stored probabilities. It has no FRFs, so that no page can be made
+        of it.
 
     Raises
     ------
     FileContentError
         It is no fit, of a later version of jointfrf, or something is missing or damaged.
+
+    See Also
+    --------
+    fit_to_dict : the dict of a fit.
+    load : read a fit from a JSON file.
 
     Examples
     --------
@@ -290,17 +314,18 @@ def fit_from_dict(content: dict[str, Any]) -> Fit:
 
 
 def save(fit: Fit, path: Path | str, *, probabilities: Sequence[float] | None = None, lines: bool = False) -> Path:
-    """Write a fit to a JSON file, whole or not at all.
+    """Write a fit to a JSON file, whole or not at all, and return the path.
 
     Parameters
     ----------
     fit : Fit
+        Fit to store.
     path : Path or str
-        In a folder that exists.
+        Name of the file, in a folder that exists.
     probabilities : sequence of float, optional
-        As in `fit_to_dict`.
+        Probabilities of additional intervals; see `fit_to_dict`.
     lines : bool
-        Whether K*(w) of each line is kept, which makes the file many times as long.
+        Whether K*(w) of each line is stored, default True; the file is then many times as long.
 
     Returns
     -------
@@ -310,30 +335,49 @@ def save(fit: Fit, path: Path | str, *, probabilities: Sequence[float] | None = 
     Raises
     ------
     ValueError
-        As `fit_to_dict`.
+        An error of `fit_to_dict`.
     OSError
         The file cannot be written.
+
+    See Also
+    --------
+    load : read the fit again.
+    write_joint : write only the joint.
+    write_report : write a page with figures.
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np, jointfrf as jf
+    >>> freq = np.linspace(0.5, 10, 100)
+    >>> h = jf.chain([5], [2500], [3], ground="start").receptance(freq)
+    >>> gamma = jf.couple(h, h, jf.Joint([2000.0], [3.0]).dynamic_stiffness(freq), [0], [0])
+    >>> fit = jf.identify(freq, jf.pollute(gamma, 0.02, seed=1), ["x"])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     same = jf.load(jf.save(fit, f"{folder}/fit.json"))
+    >>> same.value == fit.value
+    True
     """
     write_record(Path(path), fit_to_dict(fit, probabilities=probabilities, lines=lines))
     return Path(path)
 
 
 def write_record(path: Path, content: Mapping[str, Any]) -> None:
-    """Write what `fit_to_dict` returned, and what else is to be known, to a file."""
+    """Write the result of `fit_to_dict`, and additional keys, to a file."""
     write_file(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
 def load(path: Path | str) -> Fit:
-    """Read a fit that `save` wrote.
+    """Read a fit that `save` wrote, and return it.
 
     Parameters
     ----------
     path : Path or str
+        Name of the file.
 
     Returns
     -------
     Fit
-        As `fit_from_dict` makes it.
+        Fit with the same numbers, see `fit_from_dict`.
 
     Raises
     ------
@@ -341,17 +385,34 @@ def load(path: Path | str) -> Fit:
         The file is no such file, of a later version of jointfrf, or damaged.
     OSError
         It cannot be read.
+
+    See Also
+    --------
+    save : write a fit.
+    read_joint : read only the joint.
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np, jointfrf as jf
+    >>> freq = np.linspace(0.5, 10, 100)
+    >>> h = jf.chain([5], [2500], [3], ground="start").receptance(freq)
+    >>> gamma = jf.couple(h, h, jf.Joint([2000.0], [3.0]).dynamic_stiffness(freq), [0], [0])
+    >>> fit = jf.identify(freq, jf.pollute(gamma, 0.02, seed=1), ["x"], damping="viscous")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     same = jf.load(jf.save(fit, f"{folder}/fit.json"))
+    >>> list(same.value)
+    ['k_x', 'c_x']
     """
     return read_record(Path(path))[0]
 
 
 def read_record(path: Path) -> tuple[Fit, dict[str, Any]]:
-    """Read a file that `save` wrote: the fit, and all that stands there.
+    """Read a file that `save` wrote; return the fit and the whole content.
 
     Raises
     ------
     FileContentError, OSError
-        As `load`.
+        An error of `load`.
     """
     if path.exists():
         check_file(path)
@@ -363,9 +424,9 @@ def read_record(path: Path) -> tuple[Fit, dict[str, Any]]:
 
 
 def _fit_of(content: object, source: str) -> Fit:
-    """Read a fit; messages name `source` and the key that is missing or damaged."""
+    """Return the fit in a file's content; messages name `source` and the key that is missing or damaged."""
     if not isinstance(content, dict) or content.get("format") != _FORMAT:
-        raise FileContentError(f'{source} holds no fit of a joint: its "format" is not "{_FORMAT}"')
+        raise FileContentError(f'{source} contains no fit of a joint: its "format" is not "{_FORMAT}"')
     version = content.get("format_version")
     if isinstance(version, bool) or not isinstance(version, int):
         raise FileContentError(f'{source}: "format_version" must be a whole number, not {reprlib.repr(version)}')
@@ -379,12 +440,12 @@ def _fit_of(content: object, source: str) -> Fit:
     try:
         record = msgspec.convert({**older, **content}, _Record)
     except msgspec.ValidationError as error:
-        raise FileContentError(f"{source}: {_said(str(error))}") from None
+        raise FileContentError(f"{source}: {_faulty_key(str(error))}") from None
     with _named_key(source) as at:
         return _fit_of_record(record, at)
 
 
-def _said(error: str) -> str:
+def _faulty_key(error: str) -> str:
     """Return which key is missing or damaged."""
     if missing := re.fullmatch(r"Object missing required field `(\w+)`", error):
         return f'"{missing[1]}" is missing'
@@ -394,7 +455,7 @@ def _said(error: str) -> str:
 
 @contextmanager
 def _named_key(source: str) -> Iterator[list[str]]:
-    """Turn what goes wrong into an error that names the last key of the list, which the block fills."""
+    """Turn errors of the block into an error that names the last key of the list, which the block fills."""
     at = ["format"]
     try:
         yield at
@@ -422,7 +483,7 @@ def _fit_of_record(record: _Record, at: list[str]) -> Fit:
         **made,
     )
     if record.format_version > 1:
-        # A profile of the likelihood cannot be found again.
+        # The profile of the likelihood cannot be computed again.
         vars(fit)["loss_factors"] = loss_factors
     return fit
 
@@ -532,7 +593,7 @@ def _seen_of(record: _Record, _: dict[str, Any]) -> dict[str, SeenStiffness]:
 def _findings_of(record: _Record, _: dict[str, Any]) -> tuple[Finding, ...]:
     if record.format_version > 1:
         return tuple(saved_finding(own, _text) for own in record.findings or ())
-    # Version 0.1 wrote sentences alone.
+    # Version 0.1 wrote sentences without codes.
     severities = {"warning": record.warnings, "note": record.notes}
     own = ({"text": text, "severity": severity, "about": (), "bands": ()}
            for severity, texts in severities.items() for text in texts)  # fmt: skip
@@ -545,7 +606,7 @@ def _text(value: Any) -> str:
     return value
 
 
-#: Key of the file, name in `Fit`, and how it is read; later ones may need earlier ones.
+#: Key of the file, name in `Fit`, and reader; later ones may need earlier ones.
 _READERS = (
     ("dofs", "dofs", _dofs_of),
     ("parameters", "parameters", _parameters_of),

@@ -1,4 +1,4 @@
-"""Whether the residual of a fit is noise, and where it is not: which frequencies, channels, parameters, priors."""
+"""Test whether the residual of a fit is noise, and which frequencies, channels, parameters, priors contradict this."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["ResidualTest", "Trend", "check_residual", "local_excess"]
 
-#: Parts of the band, and lines that each holds at least.
+#: Number of parts of the band, and least number of lines in each.
 _PARTS, _LEAST_LINES = 24, 4
-#: Probability at which a residual of noise is called a misfit: of all lines, of parts and channels together, of
+#: Probability below which a residual of noise is called a misfit: for all lines, for parts and channels together, for
 #: neighbouring lines.
 _CHANCE = 1e-3
-#: Noise whose lines are more correlated than this says nothing of a residual that is.
+#: Correlation of the noise between lines above which the correlation of the residual is not tested.
 _INDEPENDENT = 1.05
-#: The noise found from the FRFs themselves is known to this share.
+#: Relative standard error of noise that was estimated from the FRFs.
 _NOISE_KNOWN = 0.01
-#: A prior that is off by more than so many standard deviations is denied.
+#: Distance from a prior, in standard deviations, above which the FRFs contradict it.
 _PULLED = 3.0
-#: A misfit is large from this many standard deviations of the ratio on.
+#: Excess of the ratio, in standard deviations, above which a misfit is large.
 _LARGE = 3.0
-#: Part of the excess that few lines must hold to be called local, and which part of the lines are few.
+#: Share of the excess on few lines above which it is local, and the share of all lines that is few.
 _LOCAL_SHARE, _FEW = 0.5, 0.1
-#: A line is among them with so many times the squares expected; runs of lines have gaps of no more than so many lines,
-#: or one in so many of all; so many runs are named.
+#: Ratio to the expected squares above which a line belongs to a run; largest gap of a run in lines, and as a share of
+#: all lines; number of runs that are reported.
 _EXCESSIVE, _GAP, _GAP_SHARE, _RUNS = 3, 3, 50, 5
-#: Fewer products of neighbouring lines show no correlation.
+#: Least number of products of neighbouring lines for a correlation.
 _LEAST_PRODUCTS = 16
 
 
@@ -40,12 +40,13 @@ class Trend(NamedTuple):
     Attributes
     ----------
     name : str
+        Name of the parameter.
     centres : ndarray, shape (b,)
         Middle of each part of the band, Hz.
     values : ndarray, shape (b,)
-        Parameter by part, one Gauss-Newton step from that of all lines; NaN where a part does not show it.
+        Parameter by part, one Gauss-Newton step from the estimate of all lines; NaN if a part does not determine it.
     probability : float
-        That parts differ so much by noise alone.
+        Probability that parts differ so much by noise alone.
     """
 
     name: str
@@ -55,29 +56,29 @@ class Trend(NamedTuple):
 
 
 class ResidualTest(NamedTuple):
-    """How the residual of a fit differs from noise.
+    """Difference of the residual of a fit from noise.
 
     Attributes
     ----------
     ratio : float
         Residual over noise.
     sigma : float
-        Standard deviation of this ratio where the model is right.
+        Standard deviation of this ratio if the model is right.
     neighbours : float
-        Correlation of the residual between neighbouring lines, in standard deviations of that of noise; NaN where the
-        noise itself is correlated.
+        Correlation of the residual between neighbouring lines, over the standard deviation of this correlation for
+        noise; NaN if the noise itself is correlated.
     bands : tuple of (low, high, ratio)
-        Parts of the band, Hz, where the residual exceeds the noise by more than chance, worst first.
+        Parts of the band, Hz, in which the residual exceeds the noise by more than chance, worst first.
     responses, forces : tuple of (number, ratio)
         Channels whose residual exceeds the noise by more than chance, worst first.
     pulls : tuple of (number, pull)
         Free parameters that differ from their prior by more than three standard deviations.
     local : tuple of (low, high, share)
-        Parts of the band in Hz that hold most of the excess, and their share of it; empty where it may be chance.
+        Parts of the band in Hz with most of the excess, and their share of it; empty if it may be chance.
     trends : tuple of Trend
-        Parameters that parts of the band do not agree on.
+        Parameters on which parts of the band disagree.
     of_all : float
-        Residual over noise with the lines that the fit left out, too; NaN where it left out none.
+        Residual over noise, including the lines that the fit omitted; NaN if it omitted none.
     """
 
     ratio: float
@@ -93,12 +94,12 @@ class ResidualTest(NamedTuple):
 
     @property
     def leaves_out(self) -> bool:
-        """Whether lines were left out of the fit that would make the residual noticeably larger."""
+        """Whether the fit omitted lines that would make the residual noticeably larger."""
         return self.of_all > max(self.ratio, 1 + _LARGE * self.sigma)
 
     @property
     def whole(self) -> float:
-        """Residual over noise of all lines in the band, whether they were fitted or not."""
+        """Residual over noise of all lines in the band, fitted or not."""
         return max(self.ratio, self.of_all) if np.isfinite(self.of_all) else self.ratio
 
     @property
@@ -113,7 +114,7 @@ class ResidualTest(NamedTuple):
 
     @property
     def is_noise(self) -> bool:
-        """Whether the residual is noise, no prior is denied, and no parameter changes over the band."""
+        """Whether the residual is noise, no prior is contradicted, and no parameter changes over the band."""
         quantile = float(special.ndtri(1 - _CHANCE))
         return not (
             self.whole > 1 + quantile * self.sigma
@@ -136,31 +137,32 @@ def check_residual(
     is_given: bool,
     smooth: FloatArray | None = None,
 ) -> ResidualTest:
-    """Compare a residual with its noise.
+    """Compare a residual with its noise and return the result.
 
     Parameters
     ----------
     residual : ndarray, shape (n_freq, n_o, n_i)
-        Measured minus fitted over the root of E|e|^2; NaN where nothing is measured.
+        Measured minus fitted over the root of E|e|^2; NaN if nothing was measured.
     freq_hz : ndarray, shape (n_freq,)
+        Frequencies, Hz.
     pulls : ndarray, shape (p,)
-        Free parameters less their prior, in its standard deviations.
+        Free parameters minus their prior, over its standard deviation.
     parameters : float
-        Free parameters; fewer where priors hold them.
+        Number of free parameters; smaller if priors determine them.
     inflation : float
-        Lines that carry the noise of one independent line.
+        Number of lines that carry the noise of one independent line.
     is_given : bool
-        Whether the noise was given, not found from the FRFs.
+        Whether the noise was given, not estimated from the FRFs.
     smooth : ndarray, shape (n_freq, n_o, n_i), optional
         Share of smooth errors of channels in the variance that the residual is divided by: one number each over the
         band.
 
     Notes
     -----
-    The mean square of N residuals of noise is that of chi^2 with 2 N degrees of freedom, less by the inflation and by
-    how many FRFs of a line share their noise. Noise that was found from as many FRFs scatters as much once more. The
-    residual of a model that is wrong goes smoothly over frequency, which shows far below the noise: Re r_l conj(r_l+1)
-    of noise has the mean zero.
+    The mean square of N residuals of noise follows chi^2 with 2 N degrees of freedom, divided by the inflation and by
+    the number of FRFs of a line that share their noise. Noise that was estimated from as many FRFs doubles the variance
+    of the ratio. The residual of a wrong model is smooth over frequency, which is visible far below the noise, because
+    Re r_l conj(r_l+1) of noise has mean zero.
     """
     squares, known = abs(residual) ** 2, np.isfinite(residual)
     squares = np.where(known, squares, 0)
@@ -170,7 +172,7 @@ def check_residual(
     of_channels = np.zeros(residual.shape) if smooth is None else np.where(known, smooth, 0)
 
     def judged(which: tuple[NDArray[np.intp] | slice | int, ...], chance: float) -> tuple[float, bool]:
-        """Return the ratio, and whether it exceeds what noise gives with this probability."""
+        """Return the ratio, and whether it exceeds the quantile of noise at this probability."""
         number = max(float(known[which].sum()), 1.0)
         ratio = float(np.sqrt(squares[which].sum() / number))
         share = float(of_channels[which].sum()) / number
@@ -217,7 +219,7 @@ def _mean_square(chance: float, degrees: float) -> float:
 
 
 def _shared(residual: ComplexArray) -> float:
-    """Return how many FRFs of a line have the noise of one, shape (n_freq, n_o, n_i): 1 where none share any."""
+    """Return the number of FRFs of a line, shape (n_freq, n_o, n_i), with the noise of one: 1 if none share noise."""
     flat = residual.reshape(len(residual), -1)
     whole = flat[:, np.isfinite(flat).all(axis=0)]
     n_freq, number = whole.shape
@@ -225,7 +227,7 @@ def _shared(residual: ComplexArray) -> float:
         return 1.0
     product = abs(whole.conj().T @ whole) ** 2
     size = np.sqrt(np.maximum(np.diagonal(product), np.finfo(float).tiny))
-    # Squares of correlations of noise that is independent are 1 / n_freq by chance.
+    # By chance, squared correlations of independent noise are 1 / n_freq.
     correlation = (product / np.outer(size, size) - 1 / n_freq) / (1 - 1 / n_freq)
     return float(max(correlation.sum() / number, 1.0))
 
@@ -245,13 +247,14 @@ def _neighbours(residual: ComplexArray) -> float:
 def local_excess(
     squares: FloatArray, expected: FloatArray, freq_hz: FloatArray
 ) -> tuple[tuple[float, float, float], ...]:
-    """Return runs of neighbouring lines, few in all, that hold most of the excess: (low, high, share).
+    """Return a few runs of neighbouring lines with most of the excess: (low, high, share).
 
     Parameters
     ----------
     squares, expected : ndarray, shape (n_freq,)
-        Squares of the residual of each line, and of noise.
+        Squares of the residual of each line, and expected squares of noise.
     freq_hz : ndarray, shape (n_freq,)
+        Frequencies, Hz.
     """
     excess, total = np.maximum(squares - expected, 0), (squares - expected).sum()
     if total <= 0:

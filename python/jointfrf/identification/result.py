@@ -1,4 +1,4 @@
-"""What an identification found, with its uncertainty: one kind of result for every method."""
+"""Result of an identification with its uncertainty: one class for every method."""
 
 from __future__ import annotations
 
@@ -37,32 +37,37 @@ __all__ = [
     "law_parameters",
 ]
 
-#: From a probability to the interval of each parameter.
+#: Function from a probability to the interval of each parameter.
 IntervalsByProbability = Callable[[float], dict[str, tuple[float, float]]]
-#: What tables show of a parameter whose interval has no bound.
+#: Text in tables for a parameter whose interval has no bound.
 UNDETERMINED = "undetermined"
-#: Columns of a printed fit: those of a terminal.
+#: Columns of a printed fit, as in a terminal.
 _WIDTH = 80
 
 
 @dataclass(frozen=True)
 class FittedParameter:
-    """A number that was fitted.
+    """A fitted number.
 
     Attributes
     ----------
     name : str
-        ``"k_<dof>"`` stiffness, ``"h_<dof>"`` hysteretic stiffness eta k, ``"c_<dof>"`` viscous damping,
-        ``"k_<dof>,<dof>"`` a cross term; ``"tau_<dof>"`` and the like of other laws; ``"bolt1.k_<dof>"`` at one of
-        several points; ``"A/youngs_modulus"``,
-        ``"mass A/151:y"``, ``"gain of response B/226:y"`` of models and channels.
+        Name by owner and kind:
+
+        - ``"k_<dof>"`` stiffness, ``"h_<dof>"`` hysteretic stiffness eta k, ``"c_<dof>"`` viscous damping
+        - ``"k_<dof>,<dof>"`` a cross term
+        - ``"tau_<dof>"`` and further parameters of laws
+        - ``"bolt1.k_<dof>"`` at one of several points
+        - ``"A/youngs_modulus"``, ``"mass A/151:y"``, ``"gain of response B/226:y"`` of models and channels
     unit : str
+        Unit of the value.
     kind, row, column : str
-        Of the joint: ``"k"``, ``"tau"``, ..., and its DOFs, the same twice but for a cross term. Empty elsewhere.
+        Kind of a joint parameter: ``"k"``, ``"tau"``, ..., and its DOFs, equal except for a cross term. Empty for
+        further parameters.
     origin : str
-        What it belongs to: "joint", "mean" of several joints, name of a part ("A"), "attachment", "response", "force".
+        Owner: "joint", "mean" of several joints, name of a part ("A"), "attachment", "response", "force".
     prior : (float, float) or None
-        Mean and standard deviation of what was believed before.
+        Mean and standard deviation of the prior.
     """
 
     name: str
@@ -84,14 +89,14 @@ class FittedParameter:
 
 @dataclass(frozen=True)
 class SeenStiffness:
-    """Stiffness of a DOF as seen between virtual points: of the joint and of what the sides give way together.
+    """Stiffness of a DOF between virtual points: joint and flexible sides together.
 
     Attributes
     ----------
     value, low, high : float
-        N/m or N m/rad, static, and its 95 % interval from noise and inertia; inf where it may be rigid.
+        Static stiffness, N/m or N m/rad, and its 95 % interval from noise and inertia; inf if it may be rigid.
     sides, inertia, noise : float
-        Shares in the square of the width of the interval of the joint alone, in its compliance; their sum is 1.
+        Shares in the squared width of the compliance interval of the joint alone; their sum is 1.
     """
 
     value: float
@@ -112,54 +117,56 @@ def law_parameters(joint: LawJoint) -> tuple[FittedParameter, ...]:
 
 @dataclass(frozen=True)
 class Fit(WithFindings):
-    """Parameters of a joint, and what else was unknown, with their uncertainty.
+    """Parameters of a joint and further unknowns, with their uncertainty.
 
-    It is data: `plot`, `write_report`, `save`, `cards` do something with it.
+    `plot`, `write_report`, `save` and `cards` take a fit as argument.
 
     Attributes
     ----------
     method : str
-        How they were found: "compliance" (FRFs between all joint DOFs), "model" (an assembly and any FRFs), or a method
-        of the thesis, averaged over bands.
+        Method: "compliance" (FRFs between all joint DOFs), "model" (an assembly and any FRFs), or a method of the
+        thesis, averaged over bands.
     dofs : tuple of str
         Names of the joint DOFs.
     parameters : tuple of FittedParameter
-        In the order of the covariance.
+        Parameters in the order of the covariance.
     estimate : ndarray, shape (p,)
-        Their values: `value` has them by name.
+        Values of the parameters; `value` has them by name.
     covariance : ndarray, shape (p, p)
-        Priors included.
+        Covariance of the estimate, priors included.
     noise_level : float
-        Median of the noise relative to the FRFs, as estimated or given; NaN where the method has none.
+        Median of the noise relative to the FRFs, estimated or given; NaN if the method has none.
     residual_level : float
-        What the residual of the fit shows of it; well above `noise_level`, the model of the joint is wrong.
+        Relative noise level from the residual of the fit; well above `noise_level`, the model of the joint is wrong.
     freq_hz : ndarray, shape (n_freq,)
         Lines used, Hz.
     laws : LawJoint or None
-        The joint found, where it is one of laws; `joint` is the joint of any fit.
+        Identified joint of laws; `joint` is the joint of any fit.
     findings : tuple of Finding
-        What a reader must know, the worst first: `warnings` before using the numbers, `notes` on how they came about.
+        Remarks on the fit, the worst first: read `warnings` before you use the numbers; `notes` explain the result.
     k_lines : ndarray, shape (n_freq, n, n), or None
-        K*(w) of each line by itself, N/m; NaN where a line does not give it, None where the method has none.
+        Dynamic stiffness K*(w) of each line by itself, N/m; NaN if a line does not determine it, None if the method has
+        none.
     bands : tuple
-        For each DOF the bands used, (low, high) in Hz.
+        Bands used for each DOF, (low, high) in Hz.
     responses, forces : tuple of str
         Channels of a fit of an assembly.
     residual_is_noise : bool or None
-        None where the method has no noise.
+        Whether the residual is noise; None if the method has no noise.
     test : ResidualTest or None
-        Whether the residual is noise, and if not, where; a fit that was loaded has none.
+        Test whether the residual is noise, and if not, at which lines and channels; None for a fit that was loaded.
     is_converged : bool
+        Whether the iteration converged.
     intervals : callable or None
-        From a probability to the interval of each parameter; None where it follows from the covariance. A fit that was
-        loaded has those of some probabilities.
+        Function from a probability to the interval of each parameter; None if intervals follow from the covariance. A
+        fit that was loaded has intervals at some probabilities only.
     seen : mapping of str to SeenStiffness
-        Where virtual points lie on sides that may bend, and no models of these were given: the stiffness ``"k_<dof>"``
-        as seen between them. The parameters are then those of the joint alone.
+        Stiffness ``"k_<dof>"`` between virtual points on sides that may be flexible, if no models of these were given.
+        The parameters are then the stiffnesses of the joint alone.
     data : FitData, ModelData or None
-        What it was made from, for figures and pages; a fit that was loaded has none.
+        Data behind the fit, for figures and pages; None for a fit that was loaded.
     same : tuple of tuple of str
-        Joints that are equal: their parameters are those of the first.
+        Groups of equal joints: each has the parameters of the first of its group.
     """
 
     method: str
@@ -218,7 +225,7 @@ class Fit(WithFindings):
 
     @property
     def correlation(self) -> FloatArray:
-        """Correlation of the errors of all parameters, shape (p, p); none where nothing is known of a parameter."""
+        """Correlation of the errors of all parameters, shape (p, p); 0 if a parameter has an infinite variance."""
         size = np.sqrt(np.maximum(np.diagonal(self.covariance), np.finfo(float).tiny))
         known = np.isfinite(np.outer(size, size))
         found = np.eye(size.size)
@@ -236,9 +243,9 @@ class Fit(WithFindings):
 
     @property
     def joint(self) -> Joint | LawJoint:
-        """The joint found, to be coupled, moved, reordered or written; DOFs in the order of `dofs`.
+        """Identified joint, which you can couple, move, reorder or write; DOFs in the order of `dofs`.
 
-        Several joints are one with DOFs named ``"mount.y"``; `at_point` has each.
+        Several joints are one with DOFs named ``"mount.y"``; `at_point` returns one of them.
 
         Raises
         ------
@@ -283,21 +290,21 @@ class Fit(WithFindings):
 
     @property
     def points(self) -> tuple[str, ...]:
-        """Names of the joint points of DOFs like ``"bolt1.y"``; empty where there is one point without a name."""
+        """Names of the joint points of DOFs such as ``"bolt1.y"``; empty for one point without a name."""
         return tuple(dict.fromkeys(point for point, _ in map(point_and_direction, self.dofs) if point))
 
     def at_point(self, point: str) -> Fit:
-        """Return the fit of one of several joint points, whose DOFs lose its name: for cards, `elastic_centre`, `pool`.
+        """Return the fit of one of several joint points, without its name in the DOFs: for cards and `elastic_centre`.
 
         Parameters
         ----------
         point : str
-            One of `points`.
+            Name of the point, one of `points`.
 
         Returns
         -------
         Fit
-            Its parameters, as all points together gave them, with their covariance and intervals. It has no data for
+            Parameters of the point from the common fit, with their covariance and intervals. It has no data for
             figures.
 
         Raises
@@ -369,7 +376,7 @@ class Fit(WithFindings):
             seen={names[name].name: one for name, one in self.seen.items() if name in names},
             data=None,
         )
-        if "loss_factors" in vars(self):  # of a fit that was loaded they cannot be found again
+        if "loss_factors" in vars(self):  # a fit that was loaded cannot compute them again
             etas = {parameter_name("eta", dof, dof): parameter_name("eta", new, new) for dof, new in own.items()}
             kept_etas = {etas[name]: one for name, one in self.loss_factors.items() if name in etas}
             vars(found)["loss_factors"] = kept_etas
@@ -380,34 +387,34 @@ class Fit(WithFindings):
         return replace(self, findings=worst_first(findings))
 
     def with_findings_of_data(self, findings: Sequence[Finding]) -> Fit:
-        """Return the same fit with findings of another check of its FRFs, which knows the channels better."""
+        """Return the same fit with findings of another check of its FRFs with more information on the channels."""
         of_fit = [one for one in self.findings if one.code not in DATA_MESSAGES]
         return self.with_findings([*of_fit, *(one for one in findings if one.severity != "note")])
 
     def issue_warnings(self) -> None:
-        """Issue what is in doubt as warnings of Python, at the caller of the public function that fitted."""
+        """Issue the warnings among the findings, at the caller of the public function that fitted."""
         for one in self.findings:
             if one.severity != "note":
                 warnings.warn(as_warning(one), stacklevel=3)
 
     def confidence_interval(self, probability: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Interval that contains the true parameter with the given probability.
+        """Return the interval of each parameter that contains the true value with the given probability.
 
         Parameters
         ----------
         probability : float
-            Between 0 and 1.
+            Coverage probability, between 0 and 1, default 0.95.
 
         Returns
         -------
         dict of str to (low, high)
-            By profile likelihood where it is not symmetric: a stiffness is open above, up to inf, where the joint
-            cannot be distinguished from a rigid one.
+            Intervals by name, from the profile likelihood if asymmetric. A stiffness is unbounded above, up to inf, if
+            the joint cannot be distinguished from a rigid one.
 
         Raises
         ------
         ValueError
-            The probability is not between 0 and 1; or the fit was loaded and does not keep the interval of this one,
+            The probability is not between 0 and 1; or the fit was loaded and does not contain the interval of this one,
             see `save`.
         """
         probability = as_probability("probability", probability)
@@ -425,26 +432,27 @@ class Fit(WithFindings):
         Parameters
         ----------
         function : str or callable
-            Arithmetic of names of parameters, ``"h_y / k_y"``, ``"sqrt(k_y / 2.5) / (2 * pi)"``, with sqrt, exp, log,
-            abs, pi; or a function from a dict of values by name to a number. Names with other characters than letters,
-            digits and _ stand in braces: ``"{k_y,theta} / k_y"``.
+            Arithmetic expression of names of parameters, ``"h_y / k_y"``, ``"sqrt(k_y / 2.5) / (2 * pi)"``, with sqrt,
+            exp, log, abs, pi; or a function from a dict of values by name to a number. Put names with characters other
+            than letters, digits and _ in braces: ``"{k_y,theta} / k_y"``.
         probability : float
-            Of the interval, between 0 and 1.
+            Coverage probability of the interval, between 0 and 1, default 0.95.
 
         Returns
         -------
         Derived
+            Value, standard error and interval.
 
         Raises
         ------
         ValueError
-            What is no such arithmetic, or names no parameter; a probability as in `confidence_interval`.
+            The expression is invalid, or names no parameter; a probability as in `confidence_interval`.
 
         Notes
         -----
-        Of one parameter the interval is that of the parameter, carried over. Of several it follows from the profile of
-        the likelihood, minimised over all parameters with the function held, where the fit still has its likelihood;
-        else, and for the standard error, from the covariance and the derivatives of the function.
+        For a function of one parameter, the interval is the transformed interval of the parameter. For several, it
+        follows from the profile of the likelihood, minimised over all parameters with the function fixed. Without the
+        likelihood, it follows from the covariance and the derivatives of the function, as the standard error does.
 
         Examples
         --------
@@ -463,27 +471,27 @@ class Fit(WithFindings):
         return derived_quantity(function, self._names, self.estimate, self.covariance, intervals, probability)
 
     def k_joint(self, freq_hz: ArrayLike) -> ComplexArray:
-        """Complex joint stiffness from the parameters.
+        """Return the complex joint stiffness from the parameters.
 
         Parameters
         ----------
         freq_hz : array_like, shape (n_freq,)
-            Hz.
+            Frequencies, Hz.
 
         Returns
         -------
         ndarray, shape (n_freq, n, n)
-            N/m, rotational N m/rad.
+            Dynamic stiffness, N/m, rotational N m/rad.
 
         Raises
         ------
         ValueError
-            A DOF is rigid: `joint.compliance` has it.
+            A DOF is rigid: use `joint.compliance`.
         """
         return self.joint.dynamic_stiffness(freq_hz)
 
     def unit(self, parameter: str) -> str:
-        """Return the unit of a parameter; ValueError where the fit has none of this name."""
+        """Return the unit of a parameter; ValueError if the fit has none of this name."""
         for one in self.parameters:
             if one.name == parameter:
                 return one.unit
@@ -518,7 +526,7 @@ class Fit(WithFindings):
         return "\n".join([*head, "", *columns_of(rows), *beside, *([""] if tail else []), *tail])
 
     def _seen_rows(self) -> list[tuple[str, ...]]:
-        """Return what the virtual points see, and what makes the intervals of the joint alone wide."""
+        """Return the stiffnesses between virtual points, and the causes of wide intervals of the joint alone."""
         heading = ("between virtual points", "as seen", "95 % interval", "unit", "width by sides", "inertia", "noise")
         rows: list[tuple[str, ...]] = [heading]
         for name, one in self.seen.items():
@@ -529,12 +537,12 @@ class Fit(WithFindings):
 
 
 def is_undetermined(low: float, high: float) -> bool:
-    """Whether an interval has no bound: the data do not determine the parameter."""
+    """Return whether an interval has no bound: the data do not determine the parameter."""
     return not np.isfinite(high) and (low == 0 or not np.isfinite(low))
 
 
 def _with_interval(value: float, error: float, low: float, high: float) -> tuple[str, str, str]:
-    """Return a value, its standard error and interval as shown: with one bound there is only a best estimate."""
+    """Return a value, its standard error and interval as text: with one bound there is only a best estimate."""
     if is_undetermined(low, high):
         return UNDETERMINED, "", ""
     is_open = not (np.isfinite(low) and np.isfinite(high))

@@ -30,12 +30,12 @@ __all__ = [
     "with_excess",
 ]
 
-#: Blocks of lines.
+#: Number of blocks of lines.
 BLOCKS = 10
 #: Relative tolerance of the rank of the information.
 _RANK = 1e-12
-#: Degrees of freedom of the scatter between blocks that share the information evenly. A scatter with fewer has prior
-#: odds against it: an interval from few degrees of freedom is wide.
+#: Degrees of freedom of the scatter between blocks with equal information. A scatter with fewer has prior odds against
+#: it, because an interval from few degrees of freedom is wide.
 _FULL = BLOCKS - 1.0
 
 
@@ -45,7 +45,7 @@ class Scatter(NamedTuple):
     Attributes
     ----------
     factor : ndarray
-        Over the variance for independent noise; NaN if it is unknown.
+        Ratio to the variance for independent noise; NaN if it is unknown.
     degrees : ndarray
         Degrees of freedom.
     """
@@ -65,11 +65,11 @@ class Spread(NamedTuple):
     Attributes
     ----------
     information : ndarray
-        By the correlation between lines and the size of the residual.
+        Factor by the correlation between lines and the size of the residual.
     lines : ndarray
-        By the scatter between lines, which noise that is not circular makes larger; NaN if it is unknown.
+        Factor by the scatter between lines, which noise that is not circular increases; NaN if it is unknown.
     factor : ndarray
-        The factor in use.
+        Factor in use.
     chance : ndarray
         Probability that blocks of lines scatter by as much for noise alone; 1 if there are too few lines.
     """
@@ -88,6 +88,7 @@ def scatter_of(whole: FloatArray, pieces: Iterable[LineParts]) -> tuple[FloatArr
     whole : ndarray, shape (p, p)
         Sum of the information of all clusters.
     pieces : iterable of LineParts
+        Gradients and information of the clusters.
 
     Notes
     -----
@@ -103,7 +104,7 @@ def scatter_of(whole: FloatArray, pieces: Iterable[LineParts]) -> tuple[FloatArr
     size = np.sqrt(np.maximum(np.diagonal(whole), TINY))
     value, vector = np.linalg.eigh(whole / np.outer(size, size))
     kept = value > _RANK * value[-1]
-    # Coordinates whose information is the unit matrix; in units of 1/size no square overflows.
+    # Coordinates with unit information; in units of 1/size no square overflows.
     root = vector[:, kept] / np.sqrt(value[kept])
     to_unit = root / size[:, None]
     variance, (p, k) = (root**2).sum(axis=1), root.shape
@@ -132,6 +133,7 @@ def block_members(share: FloatArray, lines: NDArray[np.intp], blocks: int = BLOC
     lines : ndarray of int
         Lines in the order in which blocks are formed, at least two a block.
     blocks : int
+        Number of blocks.
     """
     own = share[lines].sum(axis=1)
     own = own / own.sum() + 1 / lines.size
@@ -157,7 +159,7 @@ def spread_of(
     inflation : float
         Number of lines that carry the noise of one independent line.
     beside : ndarray, shape (p,)
-        Variance factor of effects that have columns of their own: clusters may differ by these, too.
+        Variance factor of effects with separate columns: clusters may differ by these, too.
     motion : ndarray, shape (n_freq,), optional
         Size of the motion on each line, if the FRFs depend on amplitude.
 
@@ -173,7 +175,7 @@ def spread_of(
     for one in (blocks, *(_scatter(at, [parts]) for parts in at.channels())):
         factor = np.maximum(with_excess(factor + beside, one) - beside, factor)
     if motion is not None:
-        # Every amplitude is as good: the variance of one is that of the mean of the blocks times their number.
+        # Amplitudes count equally: the variance of one is the variance of the mean of the blocks times their number.
         between = block_scatter(at, motion)
         factor = factor + np.nan_to_num((between.degrees + 1) * np.maximum(between.factor - by_noise, 0))
     return Spread(information, lines.factor, factor, np.nan_to_num(chance, nan=1.0))
@@ -244,7 +246,7 @@ def excess_probability(ratio: ArrayLike, degrees: ArrayLike, count: int = 1) -> 
 def with_excess(factor: FloatArray, other: Scatter) -> FloatArray:
     """Return variance factors, raised to the factors of a scatter as far as these are more than chance.
 
-    By the mean over the coordinates, and by each alone with Student's t for its few degrees of freedom.
+    The test uses the mean over the coordinates, and each coordinate with Student's t for its few degrees of freedom.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = other.factor / factor

@@ -1,4 +1,4 @@
-"""Sensitivity of an FRF of the assembly to the joint, and the sensitive bands that follow."""
+"""Sensitivity of an FRF of the assembly to the joint, and the resulting sensitive bands."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Sensitivity(NamedTuple):
     Attributes
     ----------
     parameters : tuple of str
-        ``"k_<dof>"`` for all DOFs, then ``"c_<dof>"``.
+        Names ``"k_<dof>"`` of all DOFs, then ``"c_<dof>"``.
     change : ndarray, shape (n_parameters, n_freq)
         Relative change of the FRF for one percent of the parameter, (dH/dp) (p/100)/H, complex.
     """
@@ -31,7 +31,7 @@ class Sensitivity(NamedTuple):
 
     @property
     def in_db(self) -> FloatArray:
-        """20 log10 of the modulus of `change`, shape (n_parameters, n_freq), dB."""
+        """Modulus of `change`, 20 log10, shape (n_parameters, n_freq), dB."""
         with np.errstate(divide="ignore"):
             decibel: FloatArray = 20 * np.log10(abs(self.change))
         return decibel
@@ -46,29 +46,34 @@ def sensitivity(
     output: int,
     input: int,
 ) -> Sensitivity:
-    """Sensitivity of one FRF of the assembly to each stiffness and damping of the joint.
+    """Return the sensitivity of one FRF of the assembly to each stiffness and damping of the joint.
 
     Parameters
     ----------
     freq_hz : array_like, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     h_c : array_like, shape (n_freq, n, n)
         Receptance of the assembly with this joint, m/N.
     joint : Joint
-        The joint, uncoupled DOFs.
+        Joint with uncoupled DOFs.
     dofs_j, dofs_k : array_like of int, shape (n_j,)
         Joint DOFs on both sides, in `h_c`, counted from 0.
     output, input : int
-        The FRF: response and force DOF in `h_c`, counted from 0.
+        Response and force DOF of the FRF in `h_c`, counted from 0.
 
     Returns
     -------
     Sensitivity
+        Relative changes of the FRF by parameter and line.
 
     Raises
     ------
     ValueError
         Wrong shapes or DOFs.
+
+    See Also
+    --------
+    propose_bands : bands of high sensitivity.
 
     Notes
     -----
@@ -104,30 +109,35 @@ def sensitivity(
 def propose_bands(
     freq_hz: ArrayLike, change: ArrayLike, *, drop_db: float = 20.0, smooth: float = 0.02, shortest: float = 0.02
 ) -> list[Band]:
-    """Propose sensitive bands: where the sensitivity stays near its largest value.
+    """Propose sensitive bands, in which the sensitivity is near its largest value.
 
     Parameters
     ----------
     freq_hz : array_like, shape (n_freq,)
-        Hz, increasing.
+        Frequencies, Hz, increasing.
     change : array_like, shape (n_freq,)
         Relative change of an FRF per percent of a parameter, one row of `Sensitivity.change`.
     drop_db : float
-        How far below its largest value the smoothed sensitivity may fall, dB.
+        Largest drop of the smoothed sensitivity below its largest value, dB.
     smooth : float
         Width of the moving mean that bridges resonances and antiresonances, as a share of the frequency range.
     shortest : float
-        Bands shorter than this share of the range are left out, gaps shorter than it are bridged.
+        Least length of bands and of gaps between them, as a share of the range.
 
     Returns
     -------
     list of (low, high)
-        Hz; empty where the sensitivity is zero throughout.
+        Bands, Hz; empty if the sensitivity is zero throughout.
 
     Raises
     ------
     ValueError
         Shapes that do not agree, frequencies that do not increase.
+
+    See Also
+    --------
+    sensitivity : sensitivity of an FRF.
+    identify_band_mean : mean of K* over bands.
 
     Examples
     --------
@@ -141,7 +151,7 @@ def propose_bands(
     for name, number in (("drop_db", drop_db), ("smooth", smooth), ("shortest", shortest)):
         as_number(name, number)
     if freq.size < 2 or (np.diff(freq) <= 0).any():
-        raise ValueError("freq_hz must hold at least two lines and increase")
+        raise ValueError("freq_hz must contain at least two increasing lines")
     extent = freq[-1] - freq[0]
     power = level**2
     first = np.searchsorted(freq, freq - smooth * extent / 2)

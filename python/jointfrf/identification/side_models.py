@@ -1,7 +1,7 @@
-"""Sides of a joint that bend, by their models: FRFs of channels corrected as if they were measured at the joint.
+"""Models of flexible sides of a joint, which correct FRFs of channels as if they were measured at the joint.
 
-The derivation is in docs/sides.md. With receptances of a free side between its virtual point c and the reference point
-q of the joint, those between the virtual points, gamma, become those at the joint, gamma', whatever the joint is:
+The derivation is in docs/sides.md. A free side has receptances between its virtual point c and the reference point q of
+the joint. They convert the receptances gamma between the virtual points to gamma' at the joint, for any joint:
 
     gamma'_jj = A_qq + L_A (gamma_jj - A_cc) R_A,   gamma'_jk = L_A gamma_jk R_B,   L = H_qq H_cq^-1,  R = H_qc^-1 H_qq.
 """
@@ -23,43 +23,48 @@ from jointfrf.models.model import Model
 
 __all__ = ["CorrectedFrfs", "SideModel", "corrected_frfs"]
 
-#: Standard deviations of what is not known of a model where nothing is said: Young's modulus as between batches of a
-#: metal, density with what a mesh makes of the volume.
+#: Default standard deviations of a model: Young's modulus as between batches of a metal, density including the volume
+#: error of a mesh.
 YOUNGS_MODULUS, DENSITY = 0.03, 0.02
-#: Modes up to this many times the highest line are wrong one by one; the others are, together, as by Young's modulus.
+#: Ratio to the highest line up to which modes have independent errors; errors of higher modes scale together.
 _NEAR_MODES = 4.0
-#: Elastic modes are those above this share of the highest one that the reduced model has.
+#: Elastic modes are modes above this share of the highest mode of the reduced model.
 _ELASTIC = 1e-9
-#: An error of the models that nowhere moves an FRF by this share of its noise is left out.
+#: Model errors are omitted if they change every FRF by less than this share of its noise.
 _UNSEEN = 0.03
 
-#: A channel: a DOF of the model, or the sum of some with weights.
+#: A channel: a DOF of the model, or a weighted sum of DOFs.
 ModelChannel = str | Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class SideModel:
-    """Model of one side of a joint, free of the other one, and where the channels are in it.
+    """Model of one free side of a joint, with the places of the channels in it.
 
     Parameters
     ----------
     part : Substructure
-        Its `joint` are the DOFs of the reference point, in the order of the joint DOFs; its `unknowns` say how far it
-        is known: each needs a standard deviation. Of a `Model` Young's modulus counts as known to 3 % and the density
-        to 2 % unless they are among these; FRFs are taken as exact.
+        Part with `joint` DOFs at the reference point, in the order of the joint DOFs. Its `unknowns` state the model
+        error; each needs a standard deviation. For a `Model` without these unknowns, Young's modulus has 3 % and the
+        density 2 %; FRFs are exact.
     responses : sequence of str, or of mappings of str to float
-        The responses of the side in the order of the FRFs, as DOFs of the part: ``"12:x"``; or their weighted sum, as
-        ``{"12:x": -1.0}`` of a sensor that points the other way, ``{"12:x": 0.8, "12:y": 0.6}`` of an oblique one.
-    forces : the same, optional
-        Its excitations; the responses by default.
+        Responses of the side in the order of the FRFs, as DOFs of the part, ``"12:x"``, or as weighted sums:
+        ``{"12:x": -1.0}`` for a sensor of opposite direction, ``{"12:x": 0.8, "12:y": 0.6}`` for an oblique one.
+    forces : sequence of str, or of mappings of str to float, optional
+        Excitations of the side; the responses by default.
     modes : float
-        Relative standard deviation of the eigenvalue of each mode beside that, 0.03: 1.5 % of its frequency; in place
-        of the `model_error` of the part.
+        Additional relative standard deviation of the eigenvalue of each mode, default 0.03, which is 1.5 % of its
+        frequency. It replaces the `model_error` of the part.
 
     Raises
     ------
     ValueError
         A DOF that the part does not have, an unknown without standard deviation, no channels, a negative `modes`.
+
+    See Also
+    --------
+    identify : fit that takes a pair of side models.
+    Substructure : a part with unknowns.
 
     Examples
     --------
@@ -87,8 +92,8 @@ class SideModel:
         for name, unknown in self.part.unknowns.items():
             if unknown.std is None:
                 raise ValueError(
-                    f"part: {name} has no standard deviation, and FRFs of the assembly do not determine it: say how "
-                    "far it is known, such as 0.03 of its value"
+                    f"part: {name} has no standard deviation, and FRFs of the assembly do not determine it; state one, "
+                    "such as 0.03 of its value"
                 )
         for dof in self.part.joint:
             if not self.part.has(dof):
@@ -130,14 +135,14 @@ class _Receptances(NamedTuple):
 
     @classmethod
     def of(cls, h: ComplexArray) -> _Receptances:
-        """Take them from those between q, c of the responses, c of the forces, shape (n_freq, 3 n, 3 n)."""
+        """Return the blocks of FRFs between q, c of the responses, c of the forces, shape (n_freq, 3 n, 3 n)."""
         n = h.shape[1] // 3
         q, u, f = slice(n), slice(n, 2 * n), slice(2 * n, None)
         return cls(h[:, u, f], h[:, u, q], h[:, q, f], h[:, q, q])
 
 
 class _Ends(NamedTuple):
-    """Factors of `gamma` on both sides of the joint, and what is added on one."""
+    """Factors of `gamma` on both sides of the joint, and the summand on one side."""
 
     left: ComplexArray
     right: ComplexArray
@@ -146,7 +151,7 @@ class _Ends(NamedTuple):
 
     @classmethod
     def of(cls, own: _Receptances) -> _Ends:
-        """Return those of one side; NaN on a line where its FRFs between channels and joint are singular."""
+        """Return the factors of one side; NaN on a line with singular FRFs between its channels and joint."""
         left, right = (invert(np.ascontiguousarray(one), on_singular="nan") for one in (own.cq, own.qc))
         return cls(own.qq @ left, right @ own.qq, own.cc, own.qq)
 
@@ -163,7 +168,7 @@ def _at_joint(gamma: ComplexArray, a: _Ends, b: _Ends) -> ComplexArray:
 
 
 class _ReducedSide:
-    """A side reduced once, with what is not known of it."""
+    """A side reduced once, with its model errors."""
 
     def __init__(self, name: str, model: SideModel, freq_hz: FloatArray, t_u: FloatArray, t_f: FloatArray) -> None:
         part, self.modes = model.part, model.modes
@@ -174,21 +179,21 @@ class _ReducedSide:
         rows = [_weighted(own) for own in (part.joint, model.responses, model.forces)]
         names = list(dict.fromkeys(dof for own in rows for row in own for dof in row))
         weights = [np.array([[row.get(dof, 0.0) for dof in names] for row in own]) for own in rows]
-        #: From the DOFs used to q, c of the responses and c of the forces.
+        #: Matrix from the DOFs used to q, c of the responses and c of the forces.
         self.ports = np.vstack([weights[0], t_u @ weights[1], t_f @ weights[2]])
         self.unknowns = part.unknowns
         self.reduced = ReducedSubstructure(name, part, freq_hz, names)
         self.highest = float(2 * np.pi * freq_hz.max())
 
     def nominal(self) -> _Receptances:
-        """Return the receptances as believed."""
+        """Return the nominal receptances."""
         return self._at({name: one.value for name, one in self.unknowns.items()})
 
     def _at(self, values: Mapping[str, float]) -> _Receptances:
         return _Receptances.of(self.ports @ self.reduced.at(values).h @ self.ports.T)
 
     def others(self) -> Iterator[tuple[str, _Receptances]]:
-        """Yield what the receptances may be as well: with each unknown, and each near mode, off by one deviation."""
+        """Yield perturbed receptances: each unknown, and each near mode, changed by one standard deviation."""
         believed = {name: one.value for name, one in self.unknowns.items()}
         for name, unknown in self.unknowns.items():
             assert unknown.std is not None
@@ -212,7 +217,7 @@ class _ReducedSide:
 
 
 def _of_sides(transform: FloatArray, what: str, sides: tuple[SideModel, SideModel], n: int) -> list[NDArray[np.intp]]:
-    """Return the channels of each side; raises a ValueError where its model has others."""
+    """Return the channels of each side; raise a ValueError if its model has another number of channels."""
     found = []
     for side, model in enumerate(sides):
         own = np.flatnonzero(transform[side * n : (side + 1) * n].any(axis=0))
@@ -239,7 +244,7 @@ def _both(a: ComplexArray, b: ComplexArray) -> ComplexArray:
 
 
 def _spread_at_joint(spread: FloatArray, left: ComplexArray, right: ComplexArray) -> FloatArray:
-    """Return the variance of FRFs at the joint if that between virtual points were independent, at most infinite."""
+    """Return the variance of FRFs at the joint from independent variances between virtual points, at most infinite."""
     with np.errstate(invalid="ignore"):
         found: FloatArray = abs(left) ** 2 @ spread @ abs(right) ** 2
     return np.where(np.isfinite(found), found, np.inf)
@@ -251,17 +256,17 @@ class CorrectedFrfs(NamedTuple):
     Attributes
     ----------
     h : ndarray, shape (n_freq, m_r, m_f)
-        Y' = Y + R_u (gamma' - gamma) R_f^T, m/N.
+        Corrected FRFs Y' = Y + R_u (gamma' - gamma) R_f^T, m/N.
     smooth_gamma : ndarray, shape (n_freq, 2 n, 2 n)
-        gamma' of the smooth FRFs.
+        Receptances gamma' from the smooth FRFs, m/N.
     variance : ndarray, shape (n_freq, m_r, m_f)
-        Of the noise of the measured FRFs; inf on lines that the models do not correct.
+        Noise variance of the measured FRFs, (m/N)^2; inf on lines that the models do not correct.
     noise_paths : pair of ndarray, shapes (n_freq, 2 n, m_r), (n_freq, 2 n, m_f)
-        From noise e of the measured FRFs to that of gamma', N_r e N_f^T.
+        Matrices N_r, N_f from noise e of the measured FRFs to noise N_r e N_f^T of gamma'.
     errors : ndarray, shape (n_freq, e, 2 n, 2 n)
-        By how much gamma' changes when something of the models is off by one standard deviation.
+        Change of gamma' by each model error of one standard deviation, m/N.
     error_names : tuple of str, length e
-        What: ``"j: youngs_modulus"``, ``"k: mode at 812 Hz"``.
+        Names of the model errors: ``"j: youngs_modulus"``, ``"k: mode at 812 Hz"``.
     """
 
     h: ComplexArray
@@ -281,26 +286,25 @@ def corrected_frfs(
     modes: tuple[FloatArray, FloatArray],
     sides: tuple[SideModel, SideModel],
 ) -> CorrectedFrfs:
-    """Correct FRFs of channels on sides that bend, by models of both.
+    """Return FRFs of channels on flexible sides, corrected by models of both sides.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     h, smooth : ndarray, shape (n_freq, m_r, m_f)
-        Measured and smooth FRFs of the channels, those of side j first, m/N.
+        Measured and smooth FRFs of the channels, m/N; channels of side j first.
     variance : ndarray, shape (n_freq, m_r, m_f)
-        E|e|^2 of the measured ones.
+        Noise variance E|e|^2 of the measured FRFs, (m/N)^2.
     transforms, modes : pairs of ndarray, shapes (2 n, m) and (m, 2 n)
-        T and R, of responses and of forces; T R = 1.
+        Matrices T and R of responses and of forces; T R = 1.
     sides : pair of SideModel
-        j, k.
+        Models of sides j and k.
 
     Raises
     ------
     ValueError
-        The channels or the joint DOFs of a side are not as many as the FRFs have; a model that cannot be computed on
-        these lines.
+        The channels or the joint DOFs of a side do not match the FRFs; a model cannot be computed on these lines.
     """
     t_u, t_f = transforms
     n = len(t_u) // 2

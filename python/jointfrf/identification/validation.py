@@ -1,4 +1,4 @@
-"""A joint found, put to the test: the assembly that it makes of its parts beside the measured one."""
+"""Validation of an identified joint: the assembly regenerated from its parts, compared with the measured one."""
 
 from __future__ import annotations
 
@@ -30,25 +30,25 @@ __all__ = ["Validation", "compare_frfs", "validate"]
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """A regenerated assembly beside the measured one.
+    """A regenerated assembly compared with the measured one.
 
     Attributes
     ----------
     freq_hz : ndarray, shape (n_freq,)
         Lines of the band, Hz.
     measured, regenerated : ndarray, shape (n_freq, m_r, m_f)
-        FRFs on them; NaN where one was not measured.
+        FRFs on these lines, m/N; NaN if not measured.
     responses, forces : tuple of str
         Names of rows and columns.
     amplitude_error, frequency_error : ndarray, shape (m_r, m_f)
-        Of the largest peak in the band, sought between the lines, percent (4.11), (4.12). The second is NaN where the
-        measured FRF has no peak in the band: it is largest on the first or last line.
+        Errors of the largest peak in the band, interpolated between the lines, percent (4.11), (4.12). The frequency
+        error is NaN if the measured FRF has no peak in the band: it is largest on the first or last line.
     other_mode : ndarray of bool, shape (m_r, m_f)
-        Where the largest peak of the regenerated FRF is another mode: it has a nearer peak, and falls below the
+        Whether the largest peak of the regenerated FRF is another mode: it has a nearer peak, and falls below the
         half-power level between both. The frequency error then compares two modes.
     difference : ndarray, shape (m_r, m_f)
-        Root mean square over the band of regenerated less measured, over that of the measured, percent: 100 where the
-        regenerated FRF is as good as none.
+        Root mean square over the band of regenerated minus measured FRF, over the root mean square of the measured FRF,
+        percent; 100 means no agreement.
     """
 
     freq_hz: FloatArray
@@ -78,7 +78,7 @@ class Validation:
 
     def _text(self) -> Iterator[str]:
         n = int(self.is_measured.sum())
-        yield f"regenerated beside measured: {n} FRFs, {self.freq_hz[0]:g} to {self.freq_hz[-1]:g} Hz"
+        yield f"regenerated and measured: {n} FRFs, {self.freq_hz[0]:g} to {self.freq_hz[-1]:g} Hz"
         yield "median, and largest, in percent: amplitude (4.11) and frequency (4.12) of the largest peak in the band,"
         yield "root mean square difference over the band"
         wide = max(map(len, (*self.responses, *self.forces, "response")))
@@ -103,7 +103,7 @@ class Validation:
         yield f"largest difference: {self.responses[at[0]]} / {self.forces[at[1]]}, {self.difference[at]:.3g} %"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all but the FRFs, for JSON."""
+        """Return all except the FRFs, for JSON."""
         return {
             "band_hz": [self.freq_hz[0], self.freq_hz[-1]],
             "lines": self.freq_hz.size,
@@ -142,43 +142,49 @@ def validate(
     forces: Sequence[str] | None = None,
     band: Band | None = None,
 ) -> Validation:
-    """Regenerate an assembly with a joint found, and compare it with the measured one, FRF by FRF.
+    """Regenerate an assembly with an identified joint, and compare it with the measured one, FRF by FRF.
 
     Parameters
     ----------
     freq_hz : array_like, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     measured : array_like, shape (n_freq, m_r, m_f)
-        Measured FRFs of the assembly, m/N; NaN on all lines where one is missing. Not those that the joint was
-        identified from, else it is no test: other channels, or another assembly with the same joint.
+        Measured FRFs of the assembly, m/N; NaN on all lines if one is missing. Use FRFs that did not enter the
+        identification, else it is no test: other channels, or another assembly with the same joint.
     h_a, h_b : array_like, shapes (n_freq, n_a, n_a) and (n_freq, n_b, n_b)
-        FRFs of the parts, of models or measured; of other parts than those of the identification where the joint is
-        transferred to them.
+        FRFs of the parts from models or measurements, m/N; FRFs of other parts if the joint is transferred to them.
     joint : Fit, Joint or LawJoint
-        As `identify` found it.
+        Result of `identify`, or its joint.
     dofs_a, dofs_b : array_like of int, shape (n_j,)
-        Which DOFs of the parts are those of the joint, counted from 0, as in `couple`.
+        Joint DOFs among the DOFs of the parts, counted from 0, see `couple`.
     outputs, inputs : array_like of int, optional
-        Which DOFs of the assembly, those of A and then those of B, the rows and columns of `measured` are, counted from
-        0; all by default.
+        DOFs of the rows and columns of `measured`, counted from 0 in the assembly (DOFs of A, then DOFs of B); all by
+        default.
     responses, forces : sequence of str, optional
         Names of the rows and columns; by default their numbers in the assembly.
     band : (low, high), optional
-        Hz; all lines by default.
+        Band, Hz; all lines by default.
 
     Returns
     -------
     Validation
+        Errors of each FRF.
 
     Raises
     ------
     ValueError
-        Wrong shapes, DOFs, names or band; nothing measured; a stiffness of the fit is open above, which gives no joint.
+        Wrong shapes, DOFs, names or band; nothing measured; a stiffness of the fit is unbounded, which gives no joint.
+
+    See Also
+    --------
+    couple : FRFs of an assembly with a joint.
+    amplitude_error : error (4.11) of one FRF.
+    frequency_error : error (4.12) of one FRF.
 
     Notes
     -----
-    Errors (4.11), (4.12) are those of the largest peak in the band, between the lines as `peak` finds it. They do not
-    see a peak that is missing elsewhere: the difference over the band does.
+    The errors (4.11), (4.12) compare the largest peaks in the band, between the lines as `peak` finds them. They do not
+    show that another peak is missing: the difference over the band does.
 
     Examples
     --------
@@ -218,7 +224,7 @@ def compare_frfs(
     *,
     band: Band | None = None,
 ) -> Validation:
-    """Compare regenerated FRFs, shape (n_freq, m_r, m_f), with measured ones, as `validate` says."""
+    """Compare regenerated FRFs, shape (n_freq, m_r, m_f), with measured ones; see `validate`."""
     if measured.shape != regenerated.shape:
         raise ValueError(f"measured has shape {measured.shape}, the regenerated FRFs {regenerated.shape}")
     rows, columns = as_names("responses", responses), as_names("forces", forces)
@@ -230,9 +236,9 @@ def compare_frfs(
     freq, own, made = freq_hz[inside], measured[inside], regenerated[inside]
     missing = np.asarray(np.isnan(own).all(axis=0))
     if missing.all() or not freq.size:
-        raise ValueError("measured holds no FRF in the band")
+        raise ValueError("measured contains no FRF in the band")
     if not np.isfinite(own[:, ~missing]).all():
-        raise ValueError("measured holds NaN or Inf on some lines: leave these lines out")
+        raise ValueError("measured contains NaN or Inf on some lines; omit these lines")
     size = np.sqrt((abs(own) ** 2).mean(axis=0))
     difference = 100 * np.sqrt((abs(made - own) ** 2).mean(axis=0)) / np.maximum(size, TINY)
     errors, changed = np.full((2, *missing.shape), np.nan), np.zeros(missing.shape, bool)

@@ -1,4 +1,4 @@
-"""Measured FRFs: what a file holds (`FrfSet`), how it is read (`read_frfs`) and written."""
+"""Measured FRFs: the content of a file (`FrfSet`), and functions that read (`read_frfs`) and write it."""
 
 from jointfrf.frf.frf_set import Channel, FrfSet
 from jointfrf.frf.merge import merge_frfs

@@ -1,4 +1,4 @@
-"""FRFs from arrays: axes, channels, quantity and unit are made those of a set, and everything is checked."""
+"""FRFs from arrays: axes, channels, quantity and unit are checked and converted to the form of a set."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ __all__ = ["as_frf_set", "contradiction", "finite_frfs", "frfs_of_arrays"]
 
 #: Names of the axes of an array of FRFs.
 _AXES = ("freq", "out", "in")
-#: Orders that the sizes of an array may show, where responses are before excitations.
+#: Orders of axes that follow from the sizes of an array, with responses before excitations.
 _ORDERS = ([0, 1, 2], [1, 2, 0], [1, 0, 2])
-#: FRFs that a message names.
+#: Number of FRFs that a message names.
 _SHOWN = 3
 
 
@@ -40,20 +40,23 @@ def frfs_of_arrays(
     averages: ArrayLike | None = None,
     source: str = "arrays",
 ) -> FrfSet:
-    """Make a set of FRFs from arrays, such as those of pyFBS.
+    """Return a set of FRFs made of arrays, such as the arrays of pyFBS.
 
     Parameters
     ----------
     freq_hz : array_like, shape (n_freq,)
         Frequency lines in Hz, increasing.
     h : array_like of complex, three axes in the order of `axes`
-        The FRFs; NaN on all lines where there is none.
+        FRFs in `unit`; NaN on all lines if there is none.
     responses, excitations : sequence of str, Channel or (int, int); or a table
-        Names such as ``102:+y``; pairs of node and direction code (1 to 6: x, y, z, rx, ry, rz; negative against the
-        axis); or both as tables of pyFBS, mappings or DataFrames with columns ``Position_1`` to ``Position_3`` (m) and
-        ``Direction_1`` to ``Direction_3``: channels at one place get one node, counted from 1.
+        Channels of one side, in one of these forms:
+
+        - names such as ``102:+y``
+        - pairs of node and direction code (1 to 6 are x, y, z, rx, ry, rz; negative against the axis)
+        - a table of pyFBS, mapping or DataFrame, for both sides, with columns ``Position_1`` to ``Position_3`` (m) and
+          ``Direction_1`` to ``Direction_3``; channels at one place get one node, counted from 1
     quantity : {"receptance", "mobility", "accelerance"}, optional
-        What the FRFs are; by default as `unit` says.
+        Quantity of the FRFs; by default the quantity of `unit`.
     unit : str
         Unit of the FRFs, such as ``g/N`` or ``(m/s^2)/N``; required.
     axes : str
@@ -63,17 +66,22 @@ def frfs_of_arrays(
     averages : number or array_like, shape (n_responses, n_excitations), optional
         Number of averages.
     source : str
-        Named in messages.
+        Name of the data in messages.
 
     Returns
     -------
     FrfSet
-        In SI units.
+        FRFs in SI units.
 
     Raises
     ------
     FileContentError
-        Sizes, names or units do not fit each other, or values are not finite; the sentence says which.
+        Sizes, names or units do not match, or values are not finite; the message states which.
+
+    See Also
+    --------
+    read_frfs : FRFs of files.
+    from_pyfbs : FRFs of pyFBS with the places of their channels.
 
     Examples
     --------
@@ -99,21 +107,21 @@ def frfs_of_arrays(
 
 
 def as_frf_set(content: FrfArrays, where: str, reading: Reading) -> FrfSet:
-    """Make a set of what a file holds.
+    """Return a set made of the content of a file.
 
     Parameters
     ----------
     content : FrfArrays
-        As it is in the file.
+        Content of the file, in its units and order.
     where : str
-        Its name, with which messages begin.
+        Name of the file, with which messages begin.
     reading : Reading
-        What the user states.
+        Statements of the user.
 
     Raises
     ------
     FileContentError
-        Something does not fit; the message is one sentence.
+        Something does not match; the message is one sentence.
     """
     try:
         freq_hz = _frequencies(content.freq_hz) * _hertz(content, reading)
@@ -143,24 +151,25 @@ def as_frf_set(content: FrfArrays, where: str, reading: Reading) -> FrfSet:
 
 
 def finite_frfs(frfs: FrfSet) -> tuple[FrfSet, list[str]]:
-    """Leave out a line at 0 Hz and FRFs that hold NaN or Inf.
+    """Return FRFs without a line at 0 Hz that is not finite, and without FRFs that contain NaN or Inf.
 
     Parameters
     ----------
     frfs : FrfSet
+        FRFs of a file.
 
     Returns
     -------
     FrfSet
-        Without the line at 0 Hz if an FRF is not finite there, as division by a spectrum of zero leaves it; without
-        the FRFs that are not finite on other lines.
+        FRFs without the line at 0 Hz if an FRF is not finite there, as after division by a spectrum of zero; without
+        FRFs that are not finite on other lines.
     list of str
-        What was left out, one sentence each.
+        Omitted lines and FRFs, one sentence each.
 
     Raises
     ------
     ValueError
-        No FRF is left, or the set has set-ups, whose numbers an FRF cannot leave.
+        No FRF remains, or the set has set-ups, from which no FRF can be omitted.
     """
     if frfs.setups is not None:
         frfs.check_whole()
@@ -168,8 +177,8 @@ def finite_frfs(frfs: FrfSet) -> tuple[FrfSet, list[str]]:
     bad, notes = ~np.isfinite(frfs.h) & frfs.measured, []
     if frfs.freq_hz[0] == 0.0 and bad[0].any():
         if frfs.freq_hz.size == 1:
-            raise ValueError("it holds nothing but NaN or Inf at 0 Hz")
-        notes.append(f"the line at 0 Hz holds NaN or Inf in {_pairs(frfs, bad[0])} and is left out")
+            raise ValueError("it contains only NaN or Inf at 0 Hz")
+        notes.append(f"the line at 0 Hz contains NaN or Inf in {_pairs(frfs, bad[0])} and is left out")
         coherence = None if frfs.coherence is None else frfs.coherence[1:]
         frfs, bad = replace(frfs, freq_hz=frfs.freq_hz[1:], h=frfs.h[1:], coherence=coherence), bad[1:]
     is_out = bad.any(axis=0)
@@ -192,7 +201,7 @@ def _pairs(frfs: FrfSet, chosen: NDArray[np.bool_]) -> str:
 
 
 def contradiction(said: str, wanted: str, where: str) -> str:
-    """Say that a file and its user contradict each other, as the end of a sentence that begins with the file."""
+    """Return the end of a sentence on a contradiction between a file and its user; it begins with the file."""
     return f"states {said} ({where}), not {wanted}; leave quantity and unit out, or give unit and force_quantity"
 
 
@@ -214,7 +223,7 @@ def _frequencies(values: Any) -> NDArray[np.float64]:
 
 
 def _hertz(content: FrfArrays, reading: Reading) -> float:
-    """Return the unit of the frequencies in Hz, the one that the user states or the one of the file."""
+    """Return the unit of the frequencies in Hz, stated by the user or by the file."""
     label = content.frequency_unit
     stated = parse_frequency_unit(reading.units.frequency)
     factor = reading.agreed("frequencies", stated, parse_frequency_unit(label), label)
@@ -236,7 +245,7 @@ def _channels(content: FrfArrays, reading: Reading) -> tuple[tuple[Channel, ...]
 
 
 def _in_order(what: str, values: Any, axes: str, shape: tuple[int, int, int]) -> NDArray[Any]:
-    """Values with axes frequency, response, excitation; programs may have dropped axes of length 1."""
+    """Return values with axes frequency, response, excitation; programs may have dropped axes of length 1."""
     array = _numbers(what, values)
     fitting = []
     for order in [_order(axes)] if axes else _ORDERS:
@@ -267,7 +276,7 @@ def _without_ones(shape: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _quantity(content: FrfArrays, channels: tuple[Channel, ...], reading: Reading) -> tuple[str, float]:
-    """Quantity and factor to SI."""
+    """Return the quantity and its factor to SI."""
     quantity = reading.quantity
     unit = parse_unit(content.unit)
     said = content.quantity.strip().lower()

@@ -1,4 +1,4 @@
-"""Parts of the cards of every program: a joint in six directions, fields of numbers, marks of comments."""
+"""Common parts of the cards of all programs: a joint in six directions, fields of numbers, marks of comments."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ __all__ = [
     "upper_entries",
 ]
 
-#: How lines of comment begin.
+#: Mark at the beginning of a comment line.
 COMMENT_MARKS = {"abaqus": "**", "calculix": "**", "nastran": "$", "ansys": "!", "code_aster": "#", "lsdyna": "$",
                  "subdyn": "!"}  # fmt: skip
 #: Largest number of a node, an element or a property: eight columns.
 _LARGEST = 99_999_999
-#: Columns of a large field of Nastran; digits after the point that every number keeps.
+#: Columns of a large field of Nastran; least number of digits after the point.
 _WIDE, _DIGITS = 16, 8
-#: How far from symmetric, relative to the largest entry, rounding may leave a matrix.
+#: Relative asymmetry of a matrix, over its largest entry, that rounding may cause.
 ROUND_OFF = 1e-10
 #: Arms shorter than this are rounding, m.
 NO_ARM = 1e-9
@@ -51,8 +51,9 @@ class CardTable(NamedTuple):
 class CardLink(NamedTuple):
     """A joint in all six directions: stiffness, viscous and hysteretic damping, shape (6, 6), and its numbers.
 
-    `arms` (2, 3) lead from the nodes to the reference points of the joint on the two sides, m; `positions` (2, 3) are
-    those of the nodes, where they are known; all in the `units` of the model. `faces` are nodes that follow the two.
+    `arms` (2, 3) are vectors from the nodes to the reference points of the joint on the two sides, m. `positions`
+    (2, 3) are the places of the nodes, if known. All are in the `units` of the model. `faces` are nodes that follow the
+    two nodes.
     """
 
     stiffness: FloatArray
@@ -76,21 +77,21 @@ class CardLink(NamedTuple):
 
     @property
     def has_arms(self) -> bool:
-        """Whether a node lies apart from the reference point."""
+        """Return whether the distance of a node from the reference point is not zero."""
         return bool(self.arms.any())
 
     @property
     def has_one_point(self) -> bool:
-        """Whether both arms end at the same place."""
+        """Return whether both arms end at the same point."""
         if self.positions is None:
             return True
         ends = self.positions + self.arms
         return np.allclose(ends[0], ends[1], rtol=0, atol=NO_ARM / self.units.length)
 
     def both_sides(self, matrix: FloatArray) -> FloatArray:
-        """T^T [[K, -K], [-K, K]] T: the joint resists the difference of the motions of its two points, shape (12, 12).
+        """Return T^T [[K, -K], [-K, K]] T, the stiffness against the relative motion of two points, shape (12, 12).
 
-        T takes the motions of the nodes to the motions of the points that are rigidly connected to them.
+        T maps the motions of the nodes to the motions of the points that are rigidly connected to them.
         """
         whole = np.kron(np.array([[1.0, -1.0], [-1.0, 1.0]]), matrix)
         if not self.has_arms:
@@ -100,7 +101,7 @@ class CardLink(NamedTuple):
             own = slice(6 * side, 6 * side + 6)
             turn[own, own] = rigid_offset(DIRECTIONS, self.arms[side])
         moved = turn.T @ whole @ turn
-        # What cancels but for rounding is nothing; diagonals of damping may be negative.
+        # Entries that cancel up to rounding are zero; diagonals of damping may be negative.
         size = np.sqrt(abs(moved.diagonal()))
         moved[abs(moved) < ROUND_OFF * np.outer(size, size)] = 0
         return np.asarray(moved + (moved.T - moved) / 2)
@@ -115,29 +116,30 @@ class CardLink(NamedTuple):
         return self.nodes[2 + side], direction - 2
 
     def comments(self, mark: str) -> list[str]:
-        """Write the notes as lines of comment."""
+        """Return the notes as lines of comment."""
         return [f"{mark} {note}" for note in self.notes]
 
 
 def card_integer(name: str, value: int) -> int:
-    """Check a number of a node, an element or a property: it has eight columns; raises ValueError."""
+    """Return a number of a node, an element or a property; raise ValueError if it has more than eight digits."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 < value <= _LARGEST:
         raise ValueError(f"{name} must be an integer from 1 to {_LARGEST}, not {reprlib.repr(value)}")
     return int(value)
 
 
 def card_real(value: float, columns: int = 20, letter: str = "E", digits: int = _DIGITS) -> str:
-    """Return a number with as many digits as its field takes, 14 at most.
+    """Return a number as text with as many digits as its field takes, 14 at most.
 
     Parameters
     ----------
     value : float
+        Number to write.
     columns : int
         Width of the field: Abaqus and CalculiX read 20, large fields of Nastran have 16.
     letter : str
         Letter of the exponent; without one the exponent has its sign and no zeros in front, as in Nastran.
     digits : int
-        Digits after the point that are kept, default 8.
+        Least number of digits after the point, default 8.
 
     Raises
     ------
@@ -162,14 +164,14 @@ def card_real(value: float, columns: int = 20, letter: str = "E", digits: int = 
 
 
 def upper_entries(link: CardLink, matrix: FloatArray) -> list[tuple[int, int, int, int, float]]:
-    """(node, DOF, node, DOF, entry), DOFs from 1, of the upper triangle row by row."""
+    """Return (node, DOF, node, DOF, entry), DOFs from 1, of the upper triangle row by row."""
     whole, nodes = link.both_sides(matrix), link.nodes
     found = [(r, c) for r in range(12) for c in range(r, 12) if whole[r, c] != 0]
     return [(nodes[r // 6], r % 6 + 1, nodes[c // 6], c % 6 + 1, float(whole[r, c])) for r, c in found]
 
 
 def large_card(first: str, fields: Sequence[str | int | float]) -> list[str]:
-    """Lines of a large-field card, four fields of 16 columns each."""
+    """Return lines of a large-field card, four fields of 16 columns each."""
     words = [(card_real(x, _WIDE, "") if x else "0.0") if isinstance(x, float) else str(x) for x in fields]
     rows = [words[i : i + 4] for i in range(0, len(words), 4)]
     return [
@@ -179,11 +181,11 @@ def large_card(first: str, fields: Sequence[str | int | float]) -> list[str]:
 
 
 def dmig(link: CardLink, name: str, matrix: FloatArray) -> list[str]:
-    """Write the matrix of both nodes as DMIG: symmetric, double precision, large fields."""
+    """Return the matrix of both nodes as DMIG: symmetric, double precision, large fields."""
     lines = [f"DMIG    {name:<8}{0:8d}{6:8d}{2:8d}{0:8d}"]
     column = None
     for node_a, dof_a, node_b, dof_b, value in upper_entries(link, matrix):
-        # Symmetric: the entry of a row of the upper triangle is that of a column of the lower one.
+        # By symmetry, the entry of a row of the upper triangle is the entry of a column of the lower one.
         if (node_a, dof_a) != column:
             column = (node_a, dof_a)
             lines += large_card("DMIG", [name, node_a, dof_a, "", node_b, dof_b, value])

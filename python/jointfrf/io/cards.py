@@ -37,24 +37,24 @@ from jointfrf.spelling import visible
 
 __all__ = ["CardFormat", "CardOptions", "card_integer", "card_real", "rigid_cards", "spring_cards", "table_cards"]
 
-#: A rigid arm is not as long, m: where one comes out longer, mm were taken for m.
+#: Length above which a rigid arm is an error, m: mm were probably taken for m.
 _LONGEST_ARM = 10.0
-#: Nodes in a line of a set of Abaqus and CalculiX, which take sixteen; of a continuation of Nastran.
+#: Number of nodes in a line of a set of Abaqus and CalculiX, which take sixteen; of a continuation of Nastran.
 _IN_A_LINE = 8
-#: How far, relative to their distance, rounding may put a point off the line between two nodes.
+#: Relative distance of a point from the line between two nodes that rounding may cause.
 _ON_LINE = 1e-9
-#: Terms of an equation in a line of Abaqus and CalculiX.
+#: Number of terms of an equation in a line of Abaqus and CalculiX.
 _TERMS = 4
 #: DOFs of Ansys by their numbers.
 _ANSYS_DOFS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
-#: Programs whose input has no cards for nodes that follow others here.
+#: Programs for which no cards are written for nodes that follow others.
 _WITHOUT_FACES = ("code_aster", "lsdyna", "subdyn")
-#: Characters of a line of comment: Nastran reads 72 columns.
+#: Number of characters of a comment line: Nastran reads 72 columns.
 _COMMENT = 68
 
 
 class CardOptions(TypedDict, total=False):
-    """What `Joint.export` takes beside the program and the nodes."""
+    """Options of `Joint.export` in addition to the program and the nodes."""
 
     element: int
     number: int
@@ -78,18 +78,18 @@ def spring_cards(
     nodes: Sequence[int],
     **options: Unpack[CardOptions],
 ) -> str:
-    """Write a joint as input of a finite-element program; `Joint.export` describes arguments and errors.
+    """Return a joint as input of a finite-element program; `Joint.export` describes arguments and errors.
 
     Parameters
     ----------
     program : str
-        One of `CardFormat`.
+        Name of the program, one of `CardFormat`.
     dofs : sequence of str
         Names of the n DOFs.
     matrices : tuple of three ndarray, shape (n, n)
-        Stiffness, viscous damping, hysteretic damping; N/m, N s/m, N/m and their like for rotations.
+        Stiffness, viscous damping, hysteretic damping; N/m, N s/m, N/m and the corresponding units of rotations.
     nodes, **options
-        As for `Joint.export`.
+        Nodes and options; see `Joint.export`.
 
     Returns
     -------
@@ -109,20 +109,20 @@ def table_cards(
     nodes: Sequence[int],
     **options: Unpack[CardOptions],
 ) -> str:
-    """Write K* over frequency as tables of stiffness Re K* and viscous damping Im K*/w, for direct steady-state steps.
+    """Return K* over frequency as tables of stiffness Re K* and viscous damping Im K*/w, for direct steady-state steps.
 
     Parameters
     ----------
     program : {"abaqus", "nastran", "code_aster"}
-        Other programs have no such tables.
+        Name of the program; other programs have no such tables.
     dofs : sequence of str
         Names of the n DOFs.
     freq_hz : ndarray, shape (n_freq,)
         Lines of the table, above 0 Hz, Hz.
     k_joint : ndarray, shape (n_freq, n, n)
-        N/m, rotational N m/rad.
+        Dynamic stiffness, N/m, rotational N m/rad.
     nodes, **options
-        As for `Joint.export`.
+        Nodes and options; see `Joint.export`.
 
     Returns
     -------
@@ -153,9 +153,9 @@ def table_cards(
     return _text(program, link._replace(table=table, notes=(*link.notes, *about)), options)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # `card_real` rejects the numbers that come of it
+@np.errstate(over="ignore", invalid="ignore")  # `card_real` rejects the resulting numbers
 def _text(program: CardFormat, link: CardLink, options: CardOptions) -> str:
-    """Write the elements of a joint, and what follows its nodes."""
+    """Return the elements of a joint, and cards of the faces of its nodes."""
     is_connector = options.get("connector", False)
     if is_connector and program != "abaqus":
         raise ValueError(f"connector elements are for abaqus, not for {program}; leave connector out")
@@ -189,7 +189,7 @@ def _link(
     nodes: Sequence[int],
     options: CardOptions,
 ) -> CardLink:
-    """Check the arguments of `cards`."""
+    """Check the arguments of `cards` and return the joint in six directions."""
     places = direction_places(dofs)
     units = model_units(options.get("units", "SI"))
     names = ("stiffness", "damping", "hysteretic damping")
@@ -240,7 +240,7 @@ def _widened(name: str, matrix: FloatArray, seconds: int, places: NDArray[np.int
 
 
 def _geometry(options: CardOptions, units: ModelUnits) -> tuple[FloatArray | None, FloatArray, list[str]]:
-    """Return the positions of the nodes, the arms from them to the reference points, and where these are."""
+    """Return the positions of the nodes, the arms from them to the reference points, and these points."""
     given, points = options.get("positions"), options.get("points")
     if given is None:
         if points is not None:
@@ -303,7 +303,7 @@ def _arm_note(arms: FloatArray, units: ModelUnits) -> list[str]:
 
 
 def _bodies(program: CardFormat, link: CardLink) -> list[str]:
-    """Make the nodes of the joint move with faces of solid elements; as a sketch in comments where nodes are apart."""
+    """Return cards that make the nodes move with faces of solid elements, or a sketch in comments."""
     if program in _WITHOUT_FACES:
         if link.faces is not None:
             raise ValueError(f"faces are not written for {program}; leave them out and connect the faces there")
@@ -322,22 +322,22 @@ def _bodies(program: CardFormat, link: CardLink) -> list[str]:
 def rigid_cards(
     program: CardFormat, dofs: Sequence[str], nodes: Sequence[int], options: CardOptions, *, alone: bool
 ) -> str:
-    """Write rigid DOFs of a joint as equations between the nodes, which rigid arms lead from to the joint.
+    """Return rigid DOFs of a joint as equations between the nodes, which rigid arms connect with the joint.
 
     Parameters
     ----------
     program, nodes, options
-        As for `spring_cards`.
+        Program, nodes and options; see `spring_cards`.
     dofs : sequence of str
         Names of the rigid DOFs.
     alone : bool
-        Whether there are no springs, whose cards else say where the joint is and what follows the nodes.
+        Whether there are no springs, whose cards otherwise describe the place of the joint and the faces of its nodes.
 
     Returns
     -------
     str
-        u_j + theta_j x r_j - u_k - theta_k x r_k = 0 along each DOF. Rotations of CalculiX are displacements of the
-        ROT NODEs. No equation holds a rotation that another one eliminates.
+        Equations u_j + theta_j x r_j - u_k - theta_k x r_k = 0 along each DOF. Rotations of CalculiX are displacements
+        of the ROT NODEs. An equation contains no rotation that another one eliminates.
     """
     check_choice("program", program, get_args(CardFormat))
     if program == "subdyn":
@@ -414,7 +414,7 @@ def _body_cards(
 
 
 def _small(name: str, words: Sequence[str]) -> list[str]:
-    """Lines of a small-field card, eight fields of 8 columns each; texts that are longer stay as they are."""
+    """Return lines of a small-field card, eight fields of 8 columns each; longer texts stay unchanged."""
     rows = [words[at : at + _IN_A_LINE] for at in range(0, len(words), _IN_A_LINE)]
     return [f"{name if i == 0 else '+':<8}" + "".join(f"{word:>8}" for word in row) for i, row in enumerate(rows)]
 
@@ -465,9 +465,10 @@ def _abaqus_springs(link: CardLink) -> list[str]:
 
 
 def _abaqus_connector(link: CardLink) -> list[str]:
-    """One connector element, which direct steady-state steps take: its motion is that of node K as J carries it along.
+    """Return one connector element for direct steady-state steps: motion of node K relative to node J as a rigid body.
 
-    The relative motion of the joint's point is that of node K, moved by the arm of K as K turns against J.
+    The relative motion of the joint's point is the motion of node K plus the arm of K times the rotation of K against
+    J.
     """
     if not link.has_one_point:
         raise ValueError("a connector element needs one reference point of both sides of the joint; name one in points")
@@ -517,7 +518,7 @@ def _abaqus_matrices(link: CardLink) -> list[str]:
 
 
 def _calculix(link: CardLink) -> list[str]:
-    """Springs that add up to the matrix: SPRING2 for each entry off the diagonal, SPRING1 for what a row sums up to."""
+    """Return springs that sum to the matrix: SPRING2 for each entry off the diagonal, SPRING1 for each row sum."""
     if link.hysteretic.any():
         raise ValueError("calculix has no complex spring between DOFs; leave damping out with damping=False")
     if link.damping.any() and link.damping_nodes is None:
@@ -542,7 +543,7 @@ def _calculix(link: CardLink) -> list[str]:
 
 
 def _calculix_dashpots(link: CardLink, element: int) -> list[str]:
-    """Write C = sum of c g g^T, each term as a dashpot between a node that moves by g^T (u_j - u_k) and a held one.
+    """Write C = sum of c g g^T, each term as a dashpot between a fixed node and a node that moves by g^T (u_j - u_k).
 
     DASHPOTA acts along the line between its nodes, which are one unit apart along x.
     """
@@ -625,7 +626,7 @@ def _nastran_bush(link: CardLink) -> list[str]:
 
 
 def _bush_tables(link: CardLink) -> list[str]:
-    """Write PBUSHT and its tables; PBUSH holds what other analyses take, the first line."""
+    """Return PBUSHT and its tables; PBUSH contains the first line, for other analyses."""
     if link.table is None:
         return []
     fields: list[str | int | float] = [link.number]
@@ -646,7 +647,7 @@ def _bush_tables(link: CardLink) -> list[str]:
 
 
 def _bush(link: CardLink, where: list[str | int | float]) -> list[str]:
-    """Write a CBUSH whose axes are those of the basic system."""
+    """Return a CBUSH whose axes are the axes of the basic system."""
     numbers = [link.element, link.number, *link.nodes[:2]]
     if where:
         return large_card("CBUSH", [*numbers, "", "", "", 0, *where])
@@ -654,9 +655,9 @@ def _bush(link: CardLink, where: list[str | int | float]) -> list[str]:
 
 
 def _bush_place(link: CardLink) -> tuple[list[str], list[str | int | float]] | None:
-    """Say where the spring of a CBUSH is: cards of a coordinate system, and the fields S, OCID, S1, S2, S3.
+    """Return the place of a CBUSH: cards of a coordinate system, and the fields S, OCID, S1, S2, S3.
 
-    None where the joint has not one point on both sides: a CBUSH has one.
+    None if the joint has different points on both sides: a CBUSH has one.
     """
     if link.positions is None or not link.has_arms:
         return [], []
@@ -686,7 +687,7 @@ def _nastran_matrices(link: CardLink) -> list[str]:
 
 
 def _ansys(link: CardLink) -> list[str]:
-    """MATRIX27 elements: the upper triangle row by row, UX ... ROTZ of node j, then of node k."""
+    """Return MATRIX27 elements: the upper triangle row by row, UX ... ROTZ of node j, then of node k."""
     if link.hysteretic.any():
         raise ValueError("MATRIX27 of ansys has no hysteretic damping; leave damping out with damping=False")
     lines = [*link.comments("!"), "! directions are those of the nodal coordinate systems"]

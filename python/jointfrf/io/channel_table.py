@@ -31,7 +31,7 @@ __all__ = ["ChannelKeys", "ChannelTableKeys", "places_of_table", "read_channel_t
 _COLUMN = re.compile(r"(\w+) ?(?:[(\[]([^()\[\]]*)[)\]])?")
 #: Directions of a sensor along the axes.
 _TRIAXIAL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-#: How far from 1 the length of a direction may be: that of two digits, as in (0.71, 0, -0.71); it is normalised.
+#: Largest deviation of the length of a direction from 1: rounding to two digits, as in (0.71, 0, -0.71).
 _UNIT = 1e-2
 _Three = tuple[float, float, float]
 _Node = Annotated[int, Meta(ge=1)]
@@ -69,28 +69,33 @@ _COLUMNS = ("channel", "node", "side", "role", "x", "y", "z", "direction_x", "di
 
 
 def read_channel_table(path: str | PathLike[str], *, position_unit: str = "") -> tuple[ChannelPlace, ...]:
-    r"""Read a table of channels from a TOML or CSV file, or from an Excel workbook.
+    r"""Return the places of channels from a TOML or CSV file, or from an Excel workbook.
 
     Parameters
     ----------
     path : path-like
-        ``.toml``: tables ``[[channel]]`` with the keys of `ChannelKeys`, and ``unit`` of positions (``"m"``, ``"mm"``,
-        ``"cm"``, ``"in"``; m by default). Any other name: one row for each channel, cells between commas, semicolons or
-        tabs. The heading has words out of channel, node, side, role, x, y, z, direction_x, direction_y, direction_z,
-        weight, with units of positions as in ``x [mm]``. A sheet ``book.xlsx#SHEET`` has the same columns.
-        ``test.xlsx#Channels_AB,Impacts_AB`` names two sheets of pyFBS.
+        Name of the file. ``.toml``: tables ``[[channel]]`` with the keys of `ChannelKeys`, and ``unit`` of positions
+        (``"m"``, ``"mm"``, ``"cm"``, ``"in"``; m by default). Any other name: one row for each channel, cells between
+        commas, semicolons or tabs. The heading has words out of channel, node, side, role, x, y, z, direction_x,
+        direction_y, direction_z, weight, with units of positions as in ``x [mm]``. A sheet ``book.xlsx#SHEET`` has the
+        same columns. ``test.xlsx#Channels_AB,Impacts_AB`` names two sheets of pyFBS.
     position_unit : str
         Unit of the positions of sheets of pyFBS, which do not state it: ``mm``.
 
     Returns
     -------
     tuple of ChannelPlace
-        In the order of the file.
+        Places of the channels in the order of the file.
 
     Raises
     ------
     FileContentError
         The file cannot be read, or something in it is wrong: one sentence with the row or the table.
+
+    See Also
+    --------
+    read_frfs : FRFs of the channels.
+    jointfrf.joint_channels : transform from the channels to joint DOFs.
 
     Examples
     --------
@@ -117,7 +122,7 @@ def read_channel_table(path: str | PathLike[str], *, position_unit: str = "") ->
 
 
 def places_of_table(table: TomlTable) -> tuple[ChannelPlace, ...]:
-    """Take the keys ``unit`` and ``[[channel]]`` of a TOML file that may have others; as `read_channel_table`."""
+    """Return the places in the keys ``unit`` and ``[[channel]]`` of a TOML file; see `read_channel_table`."""
     own = {name: value for name, value in table.content.items() if name in keys_of(ChannelTableKeys).names}
     return _places_of(read_keys(replace(table, content=own), ChannelTableKeys))
 
@@ -129,7 +134,7 @@ def _places_of(keys: ChannelTableKeys) -> tuple[ChannelPlace, ...]:
 
 
 def _csv_rows(file: Path) -> Iterator[ChannelKeys]:
-    """Read the rows of a CSV file as tables [[channel]] with positions in m."""
+    """Yield the rows of a CSV file as tables [[channel]] with positions in m."""
     book, sheets = sheet_names(file)
     table = read_sheet(book, sheets[0] if sheets else None) if is_sheet(file) else read_text_table(file)
     if is_pyfbs_heading(table.heading):
@@ -147,7 +152,7 @@ def _csv_rows(file: Path) -> Iterator[ChannelKeys]:
 
 
 def _column(file: Path, word: str) -> tuple[str, float]:
-    """Return the name of a column, and what one of its unit is in m."""
+    """Return the name of a column, and its unit in m."""
     match = _COLUMN.fullmatch(" ".join(word.split()))
     name = match[1].lower() if match else word.strip()
     if name not in _COLUMNS or match is None:
@@ -162,7 +167,7 @@ def _column(file: Path, word: str) -> tuple[str, float]:
 
 
 def _csv_values(table: TextTable, where: str, given: Mapping[str, str], scales: Mapping[str, float]) -> dict[str, Any]:
-    """Return the cells of a row as a TOML table would have them."""
+    """Return the cells of a row as values of a TOML table."""
 
     def number(name: str) -> float:
         try:
@@ -189,7 +194,7 @@ def _csv_values(table: TextTable, where: str, given: Mapping[str, str], scales: 
 
 
 def _places(row: ChannelKeys, unit: float = 1.0) -> list[ChannelPlace]:
-    """Return the channels that a table names, whose positions are in this unit, m."""
+    """Return the channels that a table names, with positions in this unit, m."""
     where, at = row.table.where, None if row.at is None else unit * np.array(row.at)
     if (row.channel is None) == (row.node is None):
         raise FileContentError(f"{where}: name either channel or node")

@@ -1,4 +1,4 @@
-"""Text tables: rows of cells, and FRFs in them: a column of frequencies, and two columns for each FRF."""
+"""Text tables: rows of cells, and FRFs in them, with a column of frequencies and two columns for each FRF."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _PARTS = {
     "phase": "phase", "arg": "phase", "angle": "phase",
     "coherence": "coherence", "coh": "coherence",
 }  # fmt: skip
-#: Other words of a heading: without a meaning, perhaps with a number; or a quantity. Any other word may be a scale.
+#: Further words of a heading: without a meaning, perhaps with a number; or a quantity. Any other word may be a scale.
 _FILLERS = re.compile(
     r"\b(?:(?:part|of|the|value|values|component|function|response|transfer)|"
     r"(?:frf|h|hv|channel|ch|record|curve|trace|no)(?:\s?[#:]?\s?\d{1,4})?)\b[.:]?", re.IGNORECASE
@@ -47,7 +47,7 @@ _FREQUENCY = {
     "frecuencia", "frequenza", "frequentie", "frekvens", "frequência", "hz", "omega", "ω", "w",
 }  # fmt: skip
 _TIME = {"t", "time", "times", "zeit", "temps", "tiempo", "tempo", "tijd", "tid"}
-#: A name and its unit in brackets; what stands between them without: `f, Hz`, `freq/Hz`, `freq_hz`, `f in Hz`.
+#: A name and its unit in brackets; separators if there are no brackets: `f, Hz`, `freq/Hz`, `freq_hz`, `f in Hz`.
 _BRACKETED = re.compile(r"([^()\[\]{}<>]*)[(\[{<](.+)[)\]}>]")
 _BETWEEN = re.compile(r"[\s,;:/_-]+(?:in )?")
 #: Words of the first column, of which none is a logarithm.
@@ -55,7 +55,7 @@ _WORDS, _LOGARITHM = re.compile(r"[^\W\d_]*(?:[ _.-][^\W\d_]+)*"), re.compile(r"
 _WORD, _UNIT_BEGINS = re.compile(r"[a-z]+", re.IGNORECASE), re.compile(r"[(\[{<]|\bdb\b", re.IGNORECASE)
 #: Factors of coherences by their units.
 _SHARES = {"": 1.0, "-": 1.0, "1": 1.0, "%": 0.01}
-#: Lines below which no heading is sought that a preamble may hide, and what a heading looks like.
+#: Number of lines searched for a heading behind a preamble, and pattern of a heading.
 _PREAMBLE = 200
 _HEADING = "frequency [Hz],102:+y / 101:+y real [(m/s^2)/N],102:+y / 101:+y imag [(m/s^2)/N]"
 
@@ -66,14 +66,13 @@ class TextTable(NamedTuple):
     Attributes
     ----------
     stated : dict of str
-        What comments before the heading such as ``# unit: m/N`` say, by the word before the colon in lower case.
+        Statements in comments before the heading such as ``# unit: m/N``, by the word before the colon in lower case.
     heading : list of str
         Names of the columns.
     rows : iterator of (str, list of str)
-        File and line, with which messages begin, and the cells; as many as the heading has. Each is read when it is
-        asked for.
+        File and line, with which messages begin, and the cells, one for each column. Rows are read on demand.
     decimal_comma : bool
-        Whether numbers may have one: not where commas are between the cells.
+        Whether numbers may have a decimal comma: not if commas separate cells.
     """
 
     stated: dict[str, str]
@@ -87,7 +86,7 @@ class TextTable(NamedTuple):
         Raises
         ------
         ValueError
-            The cell holds something else.
+            The cell contains something else.
         """
         return float(cell.replace(",", ".") if self.decimal_comma else cell)
 
@@ -98,14 +97,15 @@ def read_text_table(path: Path, skip_lines: int = 0) -> TextTable:
     Parameters
     ----------
     path : Path
+        Name of the file.
     skip_lines : int
-        Number of lines at the beginning that are left out, default 0.
+        Number of lines at the beginning that are skipped, default 0.
 
     Raises
     ------
     FileContentError
-        It cannot be read, it is not a text file, it is empty, or, when the rows are read, one has not as many cells as
-        the heading.
+        It cannot be read, it is not a text file, or it is empty. Reading the rows raises it if a row and the heading
+        have different numbers of cells.
     """
     lines = (
         (f"{path}: line {number}", line.strip("\x1a"))  # the end of a file of DOS
@@ -143,14 +143,14 @@ def _cells(where: str, line: str, mark: str) -> list[str]:
 
 
 def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
-    """Read columns whose names say response, excitation, part and unit, after one of frequencies."""
+    """Return the FRFs of columns whose names state response, excitation, part and unit, after one of frequencies."""
     table = read_text_table(path, reading.skip_lines)
     where, units = str(path), reading.units
     frequency_unit = _frequency_unit(path, table.heading[0], units)
     columns = _columns(table.heading[1:], where, reading)
     numbers = np.array([_numbers(table, place, cells) for place, cells in table.rows])
     if not numbers.size or not columns:
-        raise FileContentError(f"{path} holds no table of numbers below its heading")
+        raise FileContentError(f"{path} contains no table of numbers below its heading")
     parts: dict[tuple[Channel, Channel], dict[str, _FrfPart]] = {}
     for column, values in zip(columns, numbers.T[1:], strict=True):
         if column.part in parts.setdefault(column.pair, {}):
@@ -202,7 +202,7 @@ def _frequency_unit(path: Path, name: str, units: StatedUnits) -> str:
     """
     word, unit = _name_and_unit(name)
     if parse_frequency_unit(unit) is not None or (word in _FREQUENCY and (units.frequency or unit)):
-        return unit  # which the reader of all formats compares with the stated one, or calls not understood
+        return unit  # which the reader of all formats compares with the stated one, or rejects
     if word in _FREQUENCY:
         raise FileContentError(
             f"{path}: no unit in the heading {name[:40]!r}; write 'frequency [Hz]' or give unit= with frequency=Hz"
@@ -225,7 +225,7 @@ def _name_and_unit(name: str) -> tuple[str, str]:
 
 
 def _without_heading(path: Path, name: str) -> str:
-    """Say that a table has no heading, and on which line one may follow."""
+    """Return a message that a table has no heading, with the line on which one may follow."""
     for number, line in enumerate(text_of(path).splitlines()[:_PREAMBLE]):
         mark = next((each for each in "\t;," if each in line), ",")
         word, unit = _name_and_unit(line.partition(mark)[0])
@@ -233,7 +233,7 @@ def _without_heading(path: Path, name: str) -> str:
             return f"{path} has its heading on line {number + 1}; give skip_lines={number}"
     return (
         f"{path} has no heading that names frequencies and channels, but {name[:40]!r}. If it is a table of FRFs, "
-        f"write one such as '{_HEADING}', or give skip_lines= to leave out a preamble; else name a file of FRFs (.uff, "
+        f"write one such as '{_HEADING}', or give skip_lines= to omit a preamble. Otherwise name a file of FRFs (.uff, "
         ".unv, .npz, .mat, .h5)"
     )
 
@@ -249,12 +249,12 @@ class _FrfPart(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The column as messages name it."""
+        """Name of the column in messages."""
         return f"{self.part} of {self.pair[0]} / {self.pair[1]}"
 
 
 def _columns(names: list[str], where: str, reading: Reading) -> list[_FrfPart]:
-    """Read the headings of all columns; a table without channels takes those that the user names."""
+    """Read the headings of all columns; a table without channels has the channels that the user names."""
     namer, sides = reading.mapping.namer, ("responses", "excitations")
     named = [side for side in sides if getattr(reading.mapping, side) is not None]
     if not named:
@@ -265,7 +265,7 @@ def _columns(names: list[str], where: str, reading: Reading) -> list[_FrfPart]:
     if any(_PAIR.search(name) for name in names):
         raise FileContentError(f"{where} names its channels; leave out mapping responses= and excitations=")
     parts = [_part_and_unit(name, where) for name in names]
-    # An FRF begins with the first part that the one before has.
+    # An FRF begins when the first part of the previous one returns.
     numbers, held = list[int](), set[str]()
     for part, _, _ in parts:
         held = {part} if part in held else held | {part}
@@ -301,9 +301,9 @@ def _column(name: str, where: str, namer: ChannelNamer) -> _FrfPart:
 
 
 def _part_and_unit(name: str, where: str, rest: str | None = None) -> tuple[str, str, str]:
-    """Return part, unit and quantity: all that is left without channels, part and words without a meaning is unit."""
+    """Return part, unit and quantity: the rest without channels, part and words without a meaning is the unit."""
     rest = " ".join(name.split()) if rest is None else rest
-    # Behind a bracket and dB only the unit follows, or a part that stands nowhere before: [dB re 1 m/N] mag.
+    # Behind a bracket and dB only the unit follows, or a part that is nowhere before: [dB re 1 m/N] mag.
     named = _parts_in(rest, 0, _UNIT_BEGINS.search(rest)) or _parts_in(rest, _behind_brackets(rest), None)
     if len({part for part, _ in named}) != 1:
         raise _unknown_column(name, where)
@@ -330,12 +330,12 @@ def _without_in(unit: str) -> str:
 
 
 def _behind_brackets(text: str) -> int:
-    """Return where the text behind the last bracket begins; its end without brackets."""
+    """Return the position behind the last bracket; the end without brackets."""
     return 1 + max(map(text.rfind, ")]}>")) or len(text)
 
 
 def _parts_in(text: str, start: int, end: re.Match[str] | None) -> list[tuple[str, re.Match[str]]]:
-    """Return the parts of an FRF that words name, and where they stand."""
+    """Return the parts of an FRF that words name, and their positions."""
     words = _WORD.finditer(text, start, len(text) if end is None else end.start())
     return [(_PARTS[word[0].lower()], word) for word in words if word[0].lower() in _PARTS]
 
@@ -343,7 +343,7 @@ def _parts_in(text: str, start: int, end: re.Match[str] | None) -> list[tuple[st
 def _functions(
     columns: dict[str, _FrfPart], frequency: NDArray[np.float64], stated: str, reading: Reading, where: str
 ) -> list[LooseFunction]:
-    """FRF of one pair of channels, and its coherence where there is one."""
+    """Return the FRF of one pair of channels, and its coherence if there is one."""
     pair = next(iter(columns.values())).pair
     parts = set(columns) - {"coherence"}
     if parts == {"real", "imag"}:
@@ -371,10 +371,10 @@ def _functions(
 
 
 def _one_unit(column: _FrfPart, stated: str, where: str) -> str:
-    """Return the unit of the heading, or the one that a comment states for all columns."""
+    """Return the unit of the heading, or the unit that a comment states for all columns."""
     if column.unit and stated and parse_unit(column.unit) != parse_unit(stated):
         raise FileContentError(
-            f"{where}: the unit of {column.name} is '{column.unit}', a comment says '{stated}'; correct one of them"
+            f"{where}: the unit of {column.name} is '{column.unit}', a comment states '{stated}'; correct one"
         )
     return column.unit or stated
 
@@ -391,12 +391,12 @@ def _linear(column: _FrfPart, unit: str, reading: Reading, where: str) -> tuple[
         raise FileContentError(f"{where}: the unit '{unit}' {of_channels} has no reference; give unit='dB re 1 m/N'")
     if not stated and reference is None:
         return unit, column.values
-    with np.errstate(over="ignore"):  # infinite values are named later
+    with np.errstate(over="ignore"):  # a later check names infinite values
         return reference or reading.units.ratio, np.asarray(10.0 ** (column.values / 20.0))
 
 
 def _radians(column: _FrfPart, reading: Reading, where: str) -> float:
-    """Return the unit of phases in rad, the one that the user states or the one of the heading."""
+    """Return the unit of phases in rad, stated by the user or by the heading."""
     by_file = parse_phase_unit(column.unit)
     try:
         factor = reading.agreed("phases", parse_phase_unit(reading.units.phase), by_file, column.unit)
@@ -409,14 +409,14 @@ def _radians(column: _FrfPart, reading: Reading, where: str) -> float:
 
 
 def write_csv(path: str | PathLike[str], frfs: FrfSet) -> None:
-    """Write measured FRFs as a text table, real and imaginary part and where it is known coherence.
+    """Write measured FRFs as a text table: real and imaginary part, and coherence if it is known.
 
     Parameters
     ----------
     path : path-like
-        In a folder that exists; an older file is replaced as a whole or not at all.
+        Name of the file, in a folder that exists; an older file is replaced as a whole or not at all.
     frfs : FrfSet
-        The FRFs. Coordinates are not written; a number of averages only where it is one.
+        FRFs to write. Coordinates are not written; averages only if all have the same number.
 
     Raises
     ------
@@ -424,6 +424,21 @@ def write_csv(path: str | PathLike[str], frfs: FrfSet) -> None:
         There is no FRF, or one is NaN or infinite on some lines only.
     OSError
         The file cannot be written; nothing is left behind.
+
+    See Also
+    --------
+    write_frfs : write in the format of the suffix.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np, jointfrf as jf
+    >>> frfs = jf.io.frfs_of_arrays([10.0, 20.0], np.ones((2, 1, 1)), ["1:y"], ["1:y"], unit="m/N")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder) / "point.csv"
+    ...     jf.io.write_csv(path, frfs)
+    ...     print(path.read_text().splitlines()[-1])
+    20.0,1.0,0.0
     """
     fields: dict[str, Any] = fields_of(frfs)
     head = [f"# quantity: {fields['quantity']}"]
@@ -443,7 +458,7 @@ def write_csv(path: str | PathLike[str], frfs: FrfSet) -> None:
 
 
 def _looks_alike(path: Path, head: bytes) -> bool:
-    """Whether a text has the suffix, or its first line has separators or is a comment."""
+    """Return whether a text has the suffix, or its first line has separators or is a comment."""
     first = next((line for line in head.splitlines() if line.strip()), b"")
     is_text = head.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" not in head
     is_named = path.suffix.lower() in (".csv", ".txt")

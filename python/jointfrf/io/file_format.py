@@ -1,4 +1,4 @@
-"""What a format of files of FRFs consists of, and what a user states about the files that are read."""
+"""Parts of a format of files of FRFs, and statements of a user about the files."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from jointfrf.spelling import did_you_mean
 
 __all__ = ["TIME_DATA", "FileFormat", "FrfArrays", "FrfMapping", "Reading"]
 
-#: What to do with time data, to end a sentence.
+#: Remedy for time data, at the end of a sentence.
 TIME_DATA = "estimate FRFs from the time data first, for example with pyFRF"
 
 
 @dataclass(frozen=True)
 class FrfMapping:
-    """Which field of a file is what; None: by the usual names.
+    """Fields of a file by their meaning; None: fields with the usual names.
 
     Parameters
     ----------
@@ -41,11 +41,11 @@ class FrfMapping:
     real, imag, magnitude, phase_deg, phase_rad : str, optional
         Names of fields with the parts of the FRFs, in place of `h`.
     responses, excitations : str or sequence of str, optional
-        Field with the names of the channels, or these names. Functions one by one take a name for each, in their order,
-        or one for all. Or a table of pyFBS in the folder of the FRFs, ``test.xlsx#Channels_AB``.
+        Field with the names of the channels, or these names. Functions stored one by one take a name for each, in their
+        order, or one for all. Or a table of pyFBS in the folder of the FRFs, ``test.xlsx#Channels_AB``.
     response_nodes, response_directions, excitation_nodes, excitation_directions : str, optional
-        Instead: fields of nodes, or nodes such as ``1,2`` or ``1:81``; and fields of directions as names or codes 1 to
-        6, or one direction. One value stands for all channels.
+        Fields of nodes, or nodes such as ``1,2`` or ``1:81``; and fields of directions as names or codes 1 to 6, or one
+        direction. One value is used for all channels. They replace `responses` and `excitations`.
     direction : str, optional
         Direction of the channels that have none in the file.
     components : str or mapping of str to int, optional
@@ -83,16 +83,16 @@ class FrfMapping:
 
     @property
     def namer(self) -> ChannelNamer:
-        """What makes channels of the names in one file."""
+        """Maker of channels from the names in one file."""
         return ChannelNamer(self.direction, self.components)
 
     def names_of(self, side: str, count: int, where: str) -> list[Any] | None:
-        """Return the names that the user lists of a side of functions one by one; None where there are none.
+        """Return the names that the user lists for a side of functions one by one; None if there are none.
 
         Raises
         ------
         FileContentError
-            There is neither a name for each function nor one for all.
+            The number of names is not one, and not the number of functions.
         """
         given = getattr(self, side)
         if given is None or not count:
@@ -100,7 +100,7 @@ class FrfMapping:
         names = [each.strip() for each in given.split(",")] if isinstance(given, str) else list(given)
         if len(names) not in (1, count):
             raise FileContentError(
-                f"{where} holds {count} functions of a kind, and mapping {side}= has {len(names)} names; give one name "
+                f"{where} contains {count} functions of a kind, and mapping {side}= has {len(names)} names; give one "
                 "for each, in their order, or one for all"
             )
         return names * count if len(names) == 1 else names
@@ -108,26 +108,26 @@ class FrfMapping:
 
 @dataclass(frozen=True)
 class Reading:
-    """What the user states about files, and warnings for the user.
+    """Statements of the user about files, and warnings for the user.
 
     Attributes
     ----------
     quantity : str or None
-        What the FRFs are.
+        Quantity of the FRFs.
     forced : bool
-        Whether a file may contradict that.
+        Whether a file may contradict the quantity.
     nodes : frozenset of int or None
-        Only FRFs between these.
+        Nodes between which FRFs are read; all by default.
     mapping : FrfMapping
-        Which field is what.
+        Fields by their meaning.
     is_part : bool
-        Whether a file is one of several: coherence without FRFs is enough then.
+        Whether a file is one of several: coherence without FRFs is then sufficient.
     units : StatedUnits
         Units that the user states.
     skip_lines : int
-        Lines of a text table before its heading.
+        Number of lines of a text table before its heading.
     notes : list of str
-        What readers assumed or left out, one sentence each.
+        Assumptions and omissions of readers, one sentence each.
     """
 
     quantity: str | None = None
@@ -173,7 +173,7 @@ class Reading:
 
     @property
     def options(self) -> dict[str, str]:
-        """What the user states beside the quantity, by name, as messages name it."""
+        """Statements of the user in addition to the quantity, by their name in messages."""
         named = {each.name: f"mapping {each.name}=" for each in fields(self.mapping)
                  if getattr(self.mapping, each.name) is not None}  # fmt: skip
         units = {each.name: f"unit {each.name}=" for each in fields(self.units)
@@ -182,21 +182,21 @@ class Reading:
         return named | units | level | ({"skip_lines": "skip_lines="} if self.skip_lines else {})
 
     def check_options(self, taken: Collection[str] | None, names: str) -> None:
-        """Raise ValueError for an option that no file takes."""
+        """Raise ValueError for an option without effect on any file."""
         idle = [text for name, text in self.options.items() if taken is not None and name not in taken]
         if idle:
             have = "has" if len(idle) == 1 else "have"
             raise ValueError(f"{' and '.join(idle)} {have} no effect on {names}; leave it out")
 
     def agreed(self, what: str, stated: float | None, found: float | None, label: str) -> float | None:
-        """Return the factor to SI of a unit: the one that the user states, else the one of the file.
+        """Return the factor to SI of a unit, stated by the user or by the file.
 
         Parameters
         ----------
         what : str
-            Quantity whose unit it is, for the message.
+            Quantity with this unit, for the message.
         stated, found : float or None
-            Factors that the user states and that the file gives.
+            Factors that the user and the file state.
         label : str
             Unit in the file.
 
@@ -212,7 +212,7 @@ class Reading:
         return stated
 
     def warn(self) -> None:
-        """Warn of every note; to be called by a public function."""
+        """Issue a warning for every note; to be called by a public function."""
         for note in self.notes:
             warnings.warn(note, FileContentWarning, stacklevel=3)
 
@@ -239,7 +239,7 @@ def _direction(given: Any) -> str:
 
 
 def _components(given: Any) -> dict[str, int] | None:
-    """Return what is added to the nodes of each component."""
+    """Return the number that is added to the nodes of each component."""
     if given is None:
         return None
     pairs = given.items() if isinstance(given, Mapping) else [each.rpartition(":")[::2] for each in given.split(",")]
@@ -254,7 +254,7 @@ def _components(given: Any) -> dict[str, int] | None:
 
 @dataclass
 class FrfArrays:
-    """The content of a file, in its own units and order, with notes of what is not read or used."""
+    """Content of a file, in its own units and order, with notes on fields that are not read or used."""
 
     freq_hz: Any
     h: Any
@@ -283,25 +283,26 @@ class FileFormat:
     Attributes
     ----------
     name : str
+        Name of the format.
     suffixes : tuple of str
-        The usual ones; the first is the one to recommend.
+        Usual suffixes; the first is the recommended one.
     content : str
-        What is read of such a file, for the documentation.
+        Content that is read, for the documentation.
     read : callable
-        Called with the path, the limit of memory and the `Reading`; returns the arrays as they are in the file, or a
+        Function of the path, the limit of memory and the `Reading`; returns the arrays as they are in the file, or a
         set in SI units.
     has_mark : callable
-        Whether the first bytes of a file can be those of no other format.
+        Function of the first bytes of a file: whether they belong to no other format.
     looks_alike : callable
-        Whether a path and the first bytes suggest the format, where no format has its mark there.
+        Function of a path and the first bytes: whether they suggest the format, if no format has its mark there.
     write : callable, optional
-        Called with the path and a set.
+        Function of the path and a set.
     needs : str
-        What must be installed, for the documentation.
+        Packages to install, for the documentation.
     package : str
-        What writing needs beside the requirements of the installation, a name of `extras`.
+        Package that writing needs in addition to the requirements of the installation, a name of `extras`.
     keeps_setups : bool
-        Whether such a file holds which FRF came from which set-up.
+        Whether such a file contains the set-up of each FRF.
     takes : collection of str, optional
         Names of `Reading.options` that have an effect on such a file; None: all. `FrfArrays.takes` narrows it.
     """

@@ -1,4 +1,4 @@
-"""The formats of files of FRFs; `read_frfs` and `write_frfs`, which find the format of a file."""
+"""Formats of files of FRFs; `read_frfs` and `write_frfs`, which detect the format of a file."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ def _format_of(module: str) -> FileFormat:
     return next(value for value in values if isinstance(value, FileFormat))
 
 
-#: All formats, in the order in which their marks are looked for.
+#: All formats, in the order in which their marks are checked.
 FORMATS = tuple(map(_format_of, FRF_FORMATS))
-#: Entry points by which other packages add formats; they are looked at where a file is of none of the above.
+#: Entry points by which other packages add formats; they are checked if a file has none of the above formats.
 _PLUGINS = "jointfrf.formats"
 #: Why a pickle is an error.
 _PICKLE = "is a pickle, which could run any program; save an NPZ file"
-#: What to do with files of LabVIEW.
+#: Remedy for files of LabVIEW.
 _FRFS_WANTED = f", which is not read; export its FRFs as a Universal File or CSV; {TIME_DATA}"
-#: First bytes of files that are not read, and what the user can do.
+#: First bytes of files that are not read, and the remedy.
 _OTHERS = (
     *((b"\x80" + bytes([protocol]), _PICKLE) for protocol in (2, 3, 4, 5)),
     (b"\x1f\x8b", "is compressed by gzip; unpack it"),
@@ -57,7 +57,7 @@ def check_suffix(path: str | PathLike[str]) -> FileFormat:
     Raises
     ------
     ValueError
-        The suffix is that of no format that is written.
+        No format that is written has this suffix.
     """
     written = {suffix: each for each in FORMATS if each.write is not None for suffix in each.suffixes}
     suffix = Path(path).suffix.lower()
@@ -70,7 +70,7 @@ def check_suffix(path: str | PathLike[str]) -> FileFormat:
 
 
 def _of_plugin(is_wanted: Callable[[FileFormat], bool]) -> tuple[FileFormat | None, str]:
-    """Return the wanted format of another package, or what is wrong with those that fail, to end a sentence."""
+    """Return the wanted format of another package, or the errors of those that fail, to end a sentence."""
     broken = ""
     for entry in plugins(_PLUGINS):
         try:
@@ -89,14 +89,14 @@ def write_frfs(path: str | PathLike[str], frfs: FrfSet) -> None:
     Parameters
     ----------
     path : path-like
-        In a folder that exists; an older file is replaced as a whole or not at all.
+        Name of the file, in a folder that exists; an older file is replaced as a whole or not at all.
     frfs : FrfSet
-        The FRFs, with what the format holds beside them.
+        FRFs to write, with all further data that the format can contain.
 
     Raises
     ------
     ValueError
-        The suffix is that of no format that is written; there is no FRF, or one is NaN or infinite on some lines only.
+        No format that is written has this suffix; there is no FRF, or one is NaN or infinite on some lines only.
     MissingPackageError
         A package for the format is not installed.
     OSError
@@ -105,14 +105,30 @@ def write_frfs(path: str | PathLike[str], frfs: FrfSet) -> None:
     Warns
     -----
     FileContentWarning
-        The format does not hold the set-ups of a set that was merged.
+        The format cannot contain the set-ups of a set that was merged.
+
+    See Also
+    --------
+    read_frfs : read the FRFs again.
+    frfs_of_arrays : FRFs of arrays.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np, jointfrf as jf
+    >>> frfs = jf.io.frfs_of_arrays([10.0, 20.0], np.ones((2, 1, 1)), ["1:y"], ["1:y"], unit="m/N")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder) / "point.csv"
+    ...     jf.io.write_frfs(path, frfs)
+    ...     jf.io.read_frfs(path).h[:, 0, 0].real.tolist()
+    [1.0, 1.0]
     """
     kind = check_suffix(path)
     assert kind.write is not None
     kind.write(Path(path), frfs)
     if isinstance(frfs, FrfSet) and frfs.setups is not None and not kind.keeps_setups:
         keeping = ", ".join(each.suffixes[0] for each in FORMATS if each.keeps_setups)
-        message = f"{path} does not hold which FRF came from which set-up, nor those measured again: {keeping} do"
+        message = f"{path} does not contain the set-up of each FRF and repeated FRFs; {keeping} do"
         warnings.warn(message, FileContentWarning, stacklevel=2)
 
 
@@ -127,25 +143,25 @@ def read_frfs(
     unit: str = "",
     skip_lines: int = 0,
 ) -> FrfSet:
-    """Read measured FRFs from one file or several of one test.
+    """Return measured FRFs from one file or several files of one test.
 
     Parameters
     ----------
     *paths : path-like
-        Universal Files, MATLAB files (version 5 to 7; 7.3 needs h5py), NPZ files (own layout, scripts, sdynpy), HDF5
-        files (own layout, scripts), text tables. The format is detected from the content, not from the name.
+        Names of Universal Files, MATLAB files (version 5 to 7; 7.3 needs h5py), NPZ files (own layout, scripts,
+        sdynpy), HDF5 files (own layout, scripts), text tables. The content, not the name, determines the format.
     quantity : {"receptance", "mobility", "accelerance"}, optional
-        What the FRFs are, where the files do not say it.
+        Quantity of the FRFs, if the files do not state it.
     force_quantity : bool
-        Take `quantity` and `unit` also if a file states something else.
+        Whether `quantity` and `unit` replace contradicting statements of a file, default False.
     nodes : collection of int, optional
-        Only FRFs between these nodes.
+        Nodes between which FRFs are read; all by default.
     mapping : mapping, optional
-        Which field of a MATLAB, NPZ or HDF5 file is what, if it has other names than the usual ones, and what a file of
-        any format lacks, as in `FrfMapping`: ``{"h": "test.frf", "axes": "out,in,freq"}``, ``{"direction": "z"}``,
+        Fields of a MATLAB, NPZ or HDF5 file with other names than the usual ones, and data that a file of any format
+        lacks, see `FrfMapping`: ``{"h": "test.frf", "axes": "out,in,freq"}``, ``{"direction": "z"}``,
         ``{"components": "frame:0,arm:1000"}``, ``{"responses": "101:z,201:z", "excitations": "101:z"}``.
     averages : number or array_like, shape (n_responses, n_excitations), optional
-        Number of averages, where the files do not say it.
+        Number of averages, if the files do not state it.
     limit_gb : float, optional
         Largest size of one file, and of its content in memory, GB. Default: the environment variable
         JOINTFRF_FILE_LIMIT_GB, or else 16 GB of file, and 1 GB, or 10 times the size of the file, of content.
@@ -159,8 +175,8 @@ def read_frfs(
     Returns
     -------
     FrfSet
-        In SI units, with coherence, number of averages and coordinates where a file holds them; of several files,
-        `merge_frfs`.
+        FRFs in SI units, with coherence, number of averages and coordinates if a file contains them; for several files,
+        the result of `merge_frfs`.
 
     Raises
     ------
@@ -177,7 +193,12 @@ def read_frfs(
     Warns
     -----
     FileContentWarning
-        Something was left out.
+        Lines, FRFs or other data were omitted.
+
+    See Also
+    --------
+    write_frfs : write FRFs, with an example that runs.
+    read_channel_table : places of the channels.
 
     Examples
     --------
@@ -204,7 +225,7 @@ def read_frf_sets(
     unit: str = "",
     skip_lines: int = 0,
 ) -> list[FrfSet]:
-    """Read FRFs of several structures, a set of each file; arguments and errors are those of `read_frfs`."""
+    """Return FRFs of several structures, one set for each file; arguments and errors as in `read_frfs`."""
     reading = Reading.checked(quantity, force_quantity, None, mapping, unit=unit, skip_lines=skip_lines)
     sets = _read_all(paths, reading, None)
     reading.warn()
@@ -215,7 +236,7 @@ def read_frf_sets(
 
 
 def _read_all(paths: Sequence[str | PathLike[str]], reading: Reading, limit_gb: float | None) -> list[FrfSet]:
-    """Read files; raise for what the user states without effect on any of them."""
+    """Read files; raise an error for statements of the user without effect on any of them."""
     if not paths:
         raise ValueError("no file is named")
     sets, taken = [], set[str]()
@@ -228,7 +249,7 @@ def _read_all(paths: Sequence[str | PathLike[str]], reading: Reading, limit_gb: 
 
 
 def _read(path: Path, reading: Reading, limit_gb: float | None) -> tuple[FrfSet, Collection[str] | None]:
-    """Read one file; return also the options that it takes."""
+    """Read one file; return also the options with effect."""
     kind = _detected(path, head_of(path, limit_gb))
     reading, tables = with_named_files(path, reading, limit_gb)
     found, takes = kind.read(path, ReadLimit(path, limit_gb), reading), kind.takes
@@ -239,13 +260,13 @@ def _read(path: Path, reading: Reading, limit_gb: float | None) -> tuple[FrfSet,
             found.coordinates = {} if tables.oblique else tables.coordinates
         found = as_frf_set(found, str(path), reading)
         found = found if reading.nodes is None else found.at_nodes(reading.nodes)
-    if not isinstance(found, FrfSet):  # of a plugin
+    if not isinstance(found, FrfSet):  # from a plugin
         raise FileContentError(f"{path}: its reader returned a {type(found).__name__}, no FrfArrays and no FrfSet")
     return found, takes
 
 
 def _detected(path: Path, head: bytes) -> FileFormat:
-    """Return the format of a file: by a mark in its first bytes; by what it looks like; else that of a plugin."""
+    """Return the format of a file: by a mark in its first bytes; by its appearance; else the format of a plugin."""
     found, broken = next((each for each in FORMATS if each.has_mark(head)), None), ""
     refusal = next((sentence for beginning, sentence in _OTHERS if head.startswith(beginning)), "")
     if found is None and not refusal:

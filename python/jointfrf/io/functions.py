@@ -1,4 +1,4 @@
-"""FRFs that a file holds one by one, as Simcenter Testlab and sdynpy write them, put into a matrix."""
+"""FRFs that a file contains one by one, as Simcenter Testlab and sdynpy write them, combined into a matrix."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ _TIME, _FRF = 1, 4
 _FRF_TYPES = ("frf", "frequencyresponse", "h1", "h2", "hv", "transferfunction", "inertance", "accelerance", "mobility",
               "receptance")  # fmt: skip
 _COHERENCE_TYPES = ("coherence", "ordinarycoherence", "coherencefunction")
-#: Types of functions that a message names.
+#: Number of types of functions that a message names.
 _SHOWN = 5
 
 
 class LooseFunction(NamedTuple):
-    """One FRF, or with real values the coherence of one."""
+    """One FRF, or the coherence of one if its values are real."""
 
     response: Channel
     excitation: Channel
@@ -54,12 +54,13 @@ class LooseFunction(NamedTuple):
 
 
 def arrays_of_functions(functions: Sequence[LooseFunction], where: str, limit: ReadLimit | None) -> FrfArrays:
-    """Put functions into matrices.
+    """Return functions as matrices.
 
     Returns
     -------
     FrfArrays
-        Of several FRFs between the same channels the first; a note states how far the others differ from it.
+        Matrices with the first of several FRFs between the same channels; a note states the largest difference of
+        further ones.
 
     Raises
     ------
@@ -69,7 +70,7 @@ def arrays_of_functions(functions: Sequence[LooseFunction], where: str, limit: R
     """
     frfs = [each for each in functions if not each.is_coherence]
     if not frfs:
-        raise FileContentError(f"{where} holds no FRF")
+        raise FileContentError(f"{where} contains no FRF")
     first = frfs[0]
     responses = tuple(dict.fromkeys(each.response for each in frfs))
     excitations = tuple(dict.fromkeys(each.excitation for each in frfs))
@@ -109,7 +110,7 @@ def arrays_of_functions(functions: Sequence[LooseFunction], where: str, limit: R
 
 
 def difference_of(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> float:
-    """Return how far another FRF between the same channels differs from one: median over the lines, relative to it."""
+    """Return the difference of two FRFs between the same channels: median over the lines, relative to the first."""
     size = abs(one)
     with np.errstate(invalid="ignore", over="ignore"):
         apart = abs(one - other)[size > 0] / size[size > 0]
@@ -118,14 +119,14 @@ def difference_of(one: NDArray[np.complex128], other: NDArray[np.complex128]) ->
 
 
 def repetition_note(share: float, which: str, count: int) -> str:
-    """State that further FRFs between the same channels are left out, and the largest difference from the first."""
+    """State that repeated FRFs between the same channels are omitted, and the largest difference from the first."""
     apart = f"they differ by up to {100 * share:.2g} % ({which})" if share else "their values are the same"
     plural = "s" if count > 1 else ""
     return f"{count} further FRF{plural} between the same channels left out, the first is used; {apart}"
 
 
 def functions_of_sdynpy(fields: Mapping[str, Any], mapping: FrfMapping, where: str) -> list[LooseFunction]:
-    """Return the functions of a structured array of sdynpy (`NDDataArray.save`); none where there is no such array.
+    """Return the functions of a structured array of sdynpy (`NDDataArray.save`); none if there is no such array.
 
     Raises
     ------
@@ -139,7 +140,7 @@ def functions_of_sdynpy(fields: Mapping[str, Any], mapping: FrfMapping, where: s
         return []
     if kind != _FRF:
         hint = TIME_DATA if kind == _TIME else f"save FRFs (type {_FRF})"
-        raise FileContentError(f"{where} holds functions of type {kind} of sdynpy; {hint}")
+        raise FileContentError(f"{where} contains functions of type {kind} of sdynpy; {hint}")
     found, namer = [], mapping.namer
     for row in np.ravel(np.asarray(data)):
         try:
@@ -178,12 +179,12 @@ class _Column(NamedTuple):
 
 
 def functions_of_testlab(fields: Any, mapping: FrfMapping, where: str) -> tuple[list[LooseFunction], list[str]] | None:
-    """Return the FRFs and coherences of all structures that Simcenter Testlab exports, with notes of what is not read.
+    """Return the FRFs and coherences of all structures of Simcenter Testlab, with notes on functions that are not read.
 
     Returns
     -------
     list of LooseFunction, list of str; or None
-        None without such a structure.
+        FRFs with coherences, and notes; None without such a structure.
 
     Raises
     ------
@@ -201,7 +202,7 @@ def functions_of_testlab(fields: Any, mapping: FrfMapping, where: str) -> tuple[
     left_out = some_of([f"{count} of type {name}" for name, count in others.items()], _SHOWN)
     frfs = [each for each in columns if not each.is_coherence]
     if not frfs:
-        raise FileContentError(f"{where} holds no FRF, but functions ({left_out or 'coherences'}); export FRFs")
+        raise FileContentError(f"{where} contains no FRF, but functions ({left_out or 'coherences'}); export FRFs")
     coherences = [each for each in columns if each.is_coherence]
     namer = mapping.namer
     found = [each for own in (frfs, coherences) for each in _named(own, mapping, namer, where)]
@@ -233,7 +234,7 @@ def _named(columns: Sequence[_Column], mapping: FrfMapping, namer: ChannelNamer,
 
 
 def _records(content: Any) -> Iterator[Mapping[str, Any]]:
-    """Structures of Testlab, wherever they stand."""
+    """Yield structures of Testlab, at any depth."""
     if isinstance(content, Mapping):
         if {"x_values", "y_values"} <= set(content):
             yield content
@@ -246,7 +247,7 @@ def _records(content: Any) -> Iterator[Mapping[str, Any]]:
 
 
 def _columns(record: Mapping[str, Any], where: str, others: Counter[str]) -> Iterator[_Column]:
-    """FRFs and coherences of one structure, which holds a column for each; other functions are counted."""
+    """Yield FRFs and coherences of one structure, a column each; further functions are counted."""
     about = record.get("function_record")
     about = about if isinstance(about, Mapping | list) else {}
     types = [each.get("type") for each in about] if isinstance(about, list) else _texts(about.get("type"))
@@ -282,7 +283,7 @@ def _columns(record: Mapping[str, Any], where: str, others: Counter[str]) -> Ite
 
 
 def _kind(name: str) -> str:
-    """Return ``frf``, ``coherence``, or the type of a function as the file has it; no text if it has none."""
+    """Return ``frf``, ``coherence``, or the type of a function in the file; no text if it has none."""
     letters = "".join(filter(str.isalnum, name.lower()))
     if letters.startswith(_FRF_TYPES):
         return "frf"
@@ -312,7 +313,7 @@ def _needed(part: Mapping[str, Any], name: str, where: str) -> Any:
 
 
 def _lines(x_values: Mapping[str, Any], values: NDArray[Any], where: str) -> NDArray[np.float64]:
-    """Frequencies by start, increment and number, or one by one; as many as one axis of the values has."""
+    """Return frequencies by start, increment and number, or one by one, as many as one axis of the values has."""
     if values.dtype.kind not in "biufc" or values.ndim not in (1, 2):
         raise FileContentError(f"{where} is damaged: the values of a function are no columns of numbers")
     try:
@@ -334,8 +335,8 @@ def _lines(x_values: Mapping[str, Any], values: NDArray[Any], where: str) -> NDA
 def _unit(y_values: Mapping[str, Any]) -> str:
     """Return the unit of the values.
 
-    The label is the unit in which Testlab shows them. They are saved in SI (MKS), and the factor goes from there to the
-    label: 0.101972 of g. If label, factor and text disagree, the label that is returned is not understood.
+    The label is the unit in the display of Testlab. Values are saved in SI (MKS), and the factor converts them to the
+    label: 0.101972 for g. If label, factor and text disagree, the returned label is not understood.
     """
     quantity, label = _axis(y_values)
     unit = parse_unit(label)
@@ -351,7 +352,7 @@ def _unit(y_values: Mapping[str, Any]) -> str:
 
 
 def _frequency_unit(x_values: Mapping[str, Any]) -> str:
-    """Return the unit of the frequencies; any other than Hz, which need not be the one of the values, with a word."""
+    """Return the unit of the frequencies; any other than Hz, which need not be the unit of the values, with a word."""
     _, label = _axis(x_values)
     return label if not label or parse_frequency_unit(label) == 1.0 else f"{label}, saved in MKS"
 
@@ -364,7 +365,7 @@ def _axis(values: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
 
 
 def _point_names(channel: Any, n: int) -> list[str] | None:
-    """Names of points with their directions, from fields that exports have under several names."""
+    """Return names of points with their directions, from fields that exports have under several names."""
     if isinstance(channel, Mapping):
         points = next((_texts(channel[key]) for key in ("point_id", "label", "name", "point") if key in channel), [])
         ways = next((_texts(channel[key]) for key in ("direction", "point_direction") if key in channel), [])

@@ -1,4 +1,4 @@
-"""HDF5 files, MATLAB files of version 7.3 among them."""
+"""HDF5 files, including MATLAB files of version 7.3."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from jointfrf.io.named_arrays import arrays_of_fields, fields_of
 
 __all__ = ["HDF5", "hdf5_fields", "hdf5_texts", "write_hdf5"]
 
-#: Bytes that deflate makes of one, at most: 1032 by its definition, and a margin.
+#: Largest ratio of inflated to deflated bytes: 1032 by the definition of deflate, and a margin.
 _MOST_COMPRESSED = 1100
-#: Groups inside groups, and links to links: more than a sound file has, few enough for the stack.
+#: Largest depth of groups and of links: more than a sound file has, few enough for the stack.
 _DEEPEST, _MOST_LINKS = 20, 20
 #: Filters that are undone here, by their numbers in the format.
 _DEFLATE, _SHUFFLE = 1, 2
-#: Bytes of memory of a letter of MATLAB, at most, intermediate results included.
+#: Largest number of bytes of memory of a letter of MATLAB, including intermediate results.
 _LETTER = 50
 #: A text in a dataset: its length, the place of its heap, and its number in the heap.
 _PLACE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("index", "<u4")])
@@ -39,24 +39,25 @@ _NOWHERE = 2**64 - 1
 
 
 def hdf5_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
-    """Read all datasets; groups are mappings inside, structure arrays of MATLAB lists of them.
+    """Return all datasets; groups are mappings inside, structure arrays of MATLAB lists of them.
 
     Parameters
     ----------
     path : Path
-        An HDF5 file. What MATLAB wrote (by its attributes) comes back as MATLAB has it: axes in its order, texts as
-        texts, cells as lists.
+        Name of the HDF5 file. Content written by MATLAB (by its attributes) is returned as in MATLAB: axes in its
+        order, texts as texts, cells as lists.
     limit : ReadLimit
+        Limit of memory.
 
     Returns
     -------
     dict of str
-        None for what is neither numbers nor texts.
+        Datasets by name; None for data that are not numbers or texts.
 
     Raises
     ------
     FileContentError
-        The file is damaged, holds more than the limit, or refers to another file, which is not read.
+        The file is damaged, exceeds the limit, or refers to another file, which is not read.
     MissingPackageError
         The package h5py is not installed.
     """
@@ -67,7 +68,7 @@ def hdf5_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
 
 
 class _Hdf5:
-    """Reads one file; place and size of each dataset are checked before it is read."""
+    """Reads one file; position and size of each dataset are checked before it is read."""
 
     def __init__(self, h5py: Any, path: Path, limit: ReadLimit) -> None:
         self.h5py, self.path, self.limit = h5py, path, limit
@@ -79,7 +80,7 @@ class _Hdf5:
         )
 
     def group(self, group: Any, depth: int) -> Any:
-        """Return the members of a group; those of a structure array of MATLAB as a list of structures."""
+        """Return the members of a group; for a structure array of MATLAB a list of structures."""
         if depth > _DEEPEST:
             raise FileContentError(f"{self.path} has groups inside groups without end; write it again")
         items = {name: self.opened(group, name) for name in group if not name.startswith("#")}
@@ -92,7 +93,7 @@ class _Hdf5:
         return [dict(zip(found, values, strict=True)) for values in zip(*found.values(), strict=True)]
 
     def opened(self, group: Any, name: str, links: int = 0) -> Any:
-        """Return what a link leads to, inside the file."""
+        """Return the target of a link inside the file."""
         link = group.get(name, getlink=True)
         if isinstance(link, self.h5py.ExternalLink):
             raise self.elsewhere(f"{group.name.rstrip('/')}/{name}")
@@ -139,7 +140,7 @@ class _Hdf5:
             if kind == "char":
                 self.limit.take(_LETTER * item.size)
                 return _matlab_text(value)
-            return np.asarray(value).T.squeeze()  # MATLAB knows no fewer than two axes
+            return np.asarray(value).T.squeeze()  # MATLAB has at least two axes
         return _text(value)
 
     def check_size(self, item: Any, settings: Any) -> None:
@@ -147,7 +148,7 @@ class _Hdf5:
         if item.nbytes > _MOST_COMPRESSED * self.size or (item.compression is None and item.nbytes > self.size):
             size = " x ".join(map(str, item.shape))
             raise FileContentError(
-                f"{self.path} is damaged: {item.name} does not hold the {size} values that it states; write it again"
+                f"{self.path} is damaged: {item.name} does not contain the {size} values that it states; write it again"
             )
         self.limit.take(max(item.nbytes, item.size))
         filters = [settings.get_filter(number)[0] for number in range(settings.get_nfilters())]
@@ -194,7 +195,7 @@ def _matlab_text(codes: Any) -> Any:
 
 
 def _text(value: Any) -> Any:
-    """Texts as texts, however they were stored."""
+    """Return texts as texts, however they were stored."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace")
     if isinstance(value, np.ndarray) and value.dtype.kind in "SO":
@@ -205,28 +206,30 @@ def _text(value: Any) -> Any:
 
 
 def hdf5_texts(h5py: Any, item: Any, path: Path, limit: ReadLimit) -> list[str]:
-    """Read the texts of variable length of a dataset without the HDF5 library, which damaged ones crash or hang.
+    """Return the texts of variable length of a dataset without the HDF5 library, which damaged ones crash or hang.
 
     Parameters
     ----------
     h5py : module
+        The package.
     item : h5py.Dataset
-        Of texts of variable length.
+        Dataset of texts of variable length.
     path : Path
-        Its file.
+        Name of its file.
     limit : ReadLimit
+        Limit of memory.
 
     Returns
     -------
     list of str
-        In C order.
+        Texts in C order.
 
     Raises
     ------
     ValueError
         They are damaged, or stored in a way that is not read.
     FileContentError
-        They take more than the limit.
+        They exceed the limit.
     """
     if item.file.id.get_create_plist().get_sizes() != (8, 8):
         raise ValueError("its texts are stored in an unusual way, not with a fixed length")
@@ -244,7 +247,7 @@ def hdf5_texts(h5py: Any, item: Any, path: Path, limit: ReadLimit) -> list[str]:
 
 
 def _places(h5py: Any, item: Any, file: BinaryIO) -> NDArray[Any]:
-    """Return where the texts stand."""
+    """Return the places of the texts."""
     settings = item.id.get_create_plist()
     layout, places = settings.get_layout(), np.zeros(item.shape, _PLACE)
     if not item.id.get_storage_size():
@@ -327,9 +330,9 @@ def write_hdf5(path: str | PathLike[str], frfs: FrfSet) -> None:
     Parameters
     ----------
     path : path-like
-        In a folder that exists; an older file is replaced as a whole or not at all.
+        Name of the file, in a folder that exists; an older file is replaced as a whole or not at all.
     frfs : FrfSet
-        The FRFs, with coherence, number of averages and coordinates where they are known.
+        FRFs to write, with coherence, number of averages and coordinates if they are known.
 
     Raises
     ------
@@ -339,6 +342,10 @@ def write_hdf5(path: str | PathLike[str], frfs: FrfSet) -> None:
         The package h5py is not installed.
     OSError
         The file cannot be written; nothing is left behind.
+
+    See Also
+    --------
+    write_frfs : write in the format of the suffix, with an example.
 
     Notes
     -----
@@ -357,7 +364,7 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
     return arrays_of_fields(hdf5_fields(path, limit), reading.mapping, str(path), limit)
 
 
-#: The signature of the format, and where it may be: at the beginning, or after a block of the user.
+#: Signature of the format, and its possible positions: at the beginning, or after a block of the user.
 _SIGN, _PLACES = b"\x89HDF\r\n\x1a\n", (0, 512, 1024, 2048, 4096)
 HDF5 = FileFormat(
     name=FRF_FORMATS["hdf5_file"].name,

@@ -23,14 +23,14 @@ _LABEL = re.compile(r"(?:.*\D)?(\d{1,18})[\s:._]*(?:([+-]?)(r?[xyz])([+-]?)|s)?"
 
 
 class ChannelNamer:
-    """Makes channels of what files call them, with what a user says beside it.
+    """Makes channels of names in files, with directions and components that a user states.
 
     Parameters
     ----------
     direction : str, optional
         Direction of places that have none.
     components : mapping of str to int, optional
-        What is added to the nodes of each component. Without it components that number nodes alike are an error.
+        Number to add to the nodes of each component. Without it, components with equal node numbers are an error.
     """
 
     def __init__(self, direction: str | None = None, components: Mapping[str, int] | None = None) -> None:
@@ -38,7 +38,7 @@ class ChannelNamer:
         self._component_of: dict[int, str] = {}
 
     def channels(self, what: str, labels: Any) -> tuple[Channel, ...]:
-        """Return the channels of one side of a matrix; arguments and errors are those of `channels_of`."""
+        """Return the channels of one side of a matrix; arguments and errors as in `channels_of`."""
         found = tuple(self.channel(what, label) for label in _listed(labels))
         twice = next((channel for channel, count in Counter(found).items() if count > 1), None)
         if twice is not None:
@@ -97,12 +97,12 @@ def _written(components: Mapping[str, int]) -> str:
 
 
 def channels_of(what: str, labels: Any) -> tuple[Channel, ...]:
-    """Channels by their labels.
+    """Return channels by their labels.
 
     Parameters
     ----------
     what : str
-        What the labels name, for messages: ``responses``.
+        Kind of the labels in messages: ``responses``.
     labels : sequence
         Names with node and direction; pairs of node and direction code 1 to 6, negative against the axis; or a
         structured array with the fields ``node`` and ``direction``.
@@ -110,6 +110,7 @@ def channels_of(what: str, labels: Any) -> tuple[Channel, ...]:
     Returns
     -------
     tuple of Channel
+        Channels in the order of the labels.
 
     Raises
     ------
@@ -120,7 +121,7 @@ def channels_of(what: str, labels: Any) -> tuple[Channel, ...]:
 
 
 def _listed(labels: Any) -> list[Any]:
-    """Labels one by one, nodes with their direction codes as pairs."""
+    """Return labels one by one, nodes with their direction codes as pairs."""
     if isinstance(labels, str | Channel):
         return [labels]
     if not isinstance(labels, np.ndarray):

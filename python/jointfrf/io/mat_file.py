@@ -1,4 +1,4 @@
-"""MATLAB files. Versions 5 to 7 are read here, every stated size is compared with the file first; 7.3 is HDF5."""
+"""MATLAB files. Versions 5 to 7 are read here, after checking every stated size against the file; 7.3 is HDF5."""
 
 from __future__ import annotations
 
@@ -23,44 +23,45 @@ from jointfrf.io.named_arrays import arrays_of_fields, fields_of
 
 __all__ = ["MATLAB", "mat_fields", "write_mat"]
 
-#: Bytes of the header; how it begins, and how that of a file of version 7.3.
+#: Bytes of the header; its beginning, and the beginning of the header of version 7.3.
 _HEAD, _MARK, _MARK_HDF5 = 128, b"MATLAB ", b"MATLAB 7.3"
 #: Types of variables.
 _MATRIX, _COMPRESSED = 14, 15
-#: Types of elements, as numpy has them.
+#: Types of elements as types of numpy.
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 #: Types of texts: their encoding, and bytes of a character.
 _TEXTS = {1: ("latin-1", 1), 2: ("latin-1", 1), 3: ("utf-16", 2), 4: ("utf-16", 2), 16: ("utf-8", 1),
           17: ("utf-16", 2), 18: ("utf-32", 4)}  # fmt: skip
 #: Classes of arrays.
 _CELL, _STRUCT, _OBJECT, _CHAR, _OPAQUE = 1, 2, 3, 4, 17
-#: Classes of arrays of numbers, as numpy has them.
+#: Classes of arrays of numbers as types of numpy.
 _CLASSES = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8"}
 #: The flag of complex numbers.
 _COMPLEX = 0x800
-#: Cells inside cells: more than a sound file has, few enough for the stack.
+#: Largest depth of cells: more than a sound file has, few enough for the stack.
 _DEEPEST = 20
 
 
 def mat_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
-    """Read all variables.
+    """Return all variables by name.
 
     Parameters
     ----------
     path : Path
-        A MATLAB file that is not HDF5.
+        Name of a MATLAB file that is not HDF5.
     limit : ReadLimit
+        Limit of memory.
 
     Returns
     -------
     dict of str
         Arrays without axes of length 1, single values as such, texts; structures are mappings, several of them lists,
-        cells arrays of objects. None for what has no meaning here: sparse matrices, functions, tables.
+        cells arrays of objects. None for types that have no meaning here: sparse matrices, functions, tables.
 
     Raises
     ------
     FileContentError
-        The file is damaged, or holds more than the limit.
+        The file is damaged, or exceeds the limit.
     """
     with damage_named(path, "a MATLAB file", zlib.error):
         content = path.read_bytes()
@@ -72,7 +73,7 @@ def mat_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
 
 
 def _variables(content: bytes, limit: ReadLimit) -> dict[str, Any]:
-    """Read version 5 to 7."""
+    """Return the variables of version 5 to 7."""
     order: Literal["little", "big"] = "little" if content[126:_HEAD] == b"IM" else "big"
     place, found = _HEAD, dict[str, Any]()
     while place < len(content):
@@ -90,7 +91,7 @@ def _variables(content: bytes, limit: ReadLimit) -> dict[str, Any]:
 
 
 def _unpacked(packed: memoryview, order: Literal["little", "big"], limit: ReadLimit) -> memoryview:
-    """Unpack a variable, of which not more is made than it states; its checksum is compared at the end."""
+    """Unpack a variable, at most to its stated size; its checksum is compared at the end."""
     unpacker = zlib.decompressobj()
     tag = unpacker.decompress(packed, 8)
     kind, size = (int.from_bytes(tag[at : at + 4], order) for at in (0, 4))
@@ -119,7 +120,7 @@ class _Arrays:
         self.sign = "<" if order == "little" else ">"
 
     def elements(self, whole: memoryview) -> list[_Element]:
-        """Return the elements that make up an array, none beyond its end."""
+        """Return the elements of an array, none beyond its end."""
         found, place = [], 0
         while place + 8 <= len(whole):
             kind = int.from_bytes(whole[place : place + 4], self.order)
@@ -143,7 +144,7 @@ class _Arrays:
             return "", np.zeros(0)
         parts = self.elements(whole)
         if len(parts) < 2 or parts[0].kind != 6 or len(parts[0].data) != 8:
-            raise ValueError("a variable is damaged: it does not say what it is")
+            raise ValueError("a variable is damaged: its type is missing")
         flags = int.from_bytes(parts[0].data[:4], self.order)
         kind = flags & 0xFF
         if kind == _OPAQUE or len(parts) < 3:
@@ -176,7 +177,7 @@ class _Arrays:
         count = math.prod(shape)
         found = [self.values(part) for part in parts[: 1 + is_complex]]
         if len(found) < 1 + is_complex or any(each.size != count for each in found):
-            raise ValueError(f"a variable is damaged: it does not hold the {_by(shape)} values that it states")
+            raise ValueError(f"a variable is damaged: it does not contain the {_by(shape)} values that it states")
         self.limit.take(count * np.dtype(kind).itemsize * (1 + is_complex))
         real = found[0].astype(kind)
         return _squeezed(_complex(real, found[1].astype(kind)) if is_complex else real, shape)
@@ -193,7 +194,7 @@ class _Arrays:
         if shape[0] == 1 and len(shape) == 2 and unit * count == len(parts[0].data):
             return letters if count else np.array([], "U1")
         if len(letters) != count:
-            raise ValueError(f"a variable is damaged: it does not hold the {_by(shape)} letters that it states")
+            raise ValueError(f"a variable is damaged: it does not contain the {_by(shape)} letters that it states")
         if not count:
             return np.array([], "U1")
         rows = ["".join(letters[row :: shape[0]]) for row in range(shape[0])]
@@ -222,7 +223,7 @@ class _Arrays:
     def inner(self, parts: list[_Element], count: int, depth: int) -> list[Any]:
         """Return arrays inside an array."""
         if len(parts) != count or any(part.kind != _MATRIX for part in parts):
-            raise ValueError(f"a variable is damaged: it does not hold the {count} parts that it states")
+            raise ValueError(f"a variable is damaged: it does not contain the {count} parts that it states")
         return [self.array(part.data, depth + 1)[1] for part in parts]
 
 
@@ -243,7 +244,7 @@ def _complex(real: NDArray[Any], imaginary: NDArray[Any]) -> NDArray[Any]:
 def _squeezed(values: NDArray[Any], shape: tuple[int, ...]) -> Any:
     """Return an array, stored column by column, without axes of length 1; a single value as such."""
     if values.size != math.prod(shape):
-        raise ValueError(f"a variable is damaged: it does not hold the {_by(shape)} values that it states")
+        raise ValueError(f"a variable is damaged: it does not contain the {_by(shape)} values that it states")
     if not values.size:
         return values
     found = values.reshape(shape, order="F").squeeze()
@@ -279,9 +280,9 @@ def write_mat(path: str | PathLike[str], frfs: FrfSet) -> None:
     Parameters
     ----------
     path : path-like
-        In a folder that exists; an older file is replaced as a whole or not at all.
+        Name of the file, in a folder that exists; an older file is replaced as a whole or not at all.
     frfs : FrfSet
-        The FRFs, with coherence, number of averages and coordinates if they are known.
+        FRFs to write, with coherence, number of averages and coordinates if they are known.
 
     Raises
     ------
@@ -290,11 +291,19 @@ def write_mat(path: str | PathLike[str], frfs: FrfSet) -> None:
     OSError
         The file cannot be written; nothing is left behind.
 
+    See Also
+    --------
+    write_frfs : write in the format of the suffix, with an example.
+
     Notes
     -----
-    Variables in SI units: ``freq_hz`` (lines x 1), ``h`` (lines x responses x excitations, NaN where there is no FRF),
-    ``responses`` and ``excitations`` (columns of cells with names such as ``102:+y``), ``quantity``, ``unit``, and
-    ``coherence``, ``averages``, ``nodes``, ``coordinates`` if they are known.
+    The variables are in SI units:
+
+    - ``freq_hz`` (lines x 1)
+    - ``h`` (lines x responses x excitations), NaN if there is no FRF
+    - ``responses`` and ``excitations``, columns of cells with names such as ``102:+y``
+    - ``quantity`` and ``unit``
+    - ``coherence``, ``averages``, ``nodes``, ``coordinates`` if they are known
     """
     import scipy.io
 

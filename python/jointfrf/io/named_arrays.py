@@ -23,11 +23,11 @@ from jointfrf.spelling import some_of
 
 __all__ = ["arrays_of_fields", "fields_of"]
 
-#: The field that says whose layout it is; its value is the number of the layout.
+#: Field that identifies the own layout; its value is the number of the layout.
 _MARK = "jointfrf_frfs"
-#: The layout that is written, and the one without a checksum, which is read as well.
+#: Layout that is written, and the layout without a checksum, which is read as well.
 _LAYOUT, _UNCHECKED = 2, 1
-#: The field with a checksum of all others, which layout 1 lacks; who edits a file writes layout 1 without it.
+#: Field with a checksum of all others; layout 1 lacks it, so that edited files are written as layout 1.
 _CHECKSUM = "sha256"
 #: Fields of every file in the own layout; units by how often a receptance is differentiated.
 _REQUIRED = ("freq_hz", "h", "responses", "excitations", "quantity")
@@ -37,7 +37,7 @@ _FIELDS = (_MARK, *_REQUIRED, "unit", "coherence", "averages", "nodes", "coordin
            "setup_gains", "setup_repeats", "setup_repeated", _CHECKSUM)  # fmt: skip
 
 
-#: Names, in lower case, that are taken for a field where the user names none.
+#: Names, in lower case, of fields that are used if the user names none.
 _KNOWN = {
     "freq_hz": ("freq_hz", "freq", "freqs", "f", "f_hz", "frequency", "frequencies", "frequency_hz", "freqv",
                 "omega", "w"),
@@ -55,19 +55,19 @@ _KNOWN = {
     "coherence": ("coherence", "coh", "gamma2", "coherences"),
     "averages": ("averages", "n_averages", "navg", "n_avg", "number_of_averages"),
 }  # fmt: skip
-#: Options that have an effect on functions one by one, and on arrays that are found by their names.
+#: Options with an effect on functions one by one, and on arrays that are identified by their names.
 _TAKEN_BY_SDYNPY = ("direction", "components")
 _TAKEN_BY_TESTLAB = ("responses", "excitations", *_TAKEN_BY_SDYNPY)
 _TAKEN_BY_ARRAYS = (*(each.name for each in dataclass_fields(FrfMapping)), "frequency")
-#: Fields with parts of FRFs, by which the user may name these.
+#: Fields with parts of FRFs that the user may name.
 _PARTS = ("real", "imag", "magnitude", "phase_deg", "phase_rad")
 #: Frequencies that the user gives: a list of numbers, or first one and spacing.
 _LITERAL = re.compile(r"[,:]|^[0-9.]+$")
 #: Nodes that the user gives, one by one or as ranges; longer ranges are slips.
 _NODES, _MOST_NODES = re.compile(r"\d{1,18}(?::\d{1,18})?(?:,\d{1,18}(?::\d{1,18})?)*"), 100_000
-#: Fields that a message names, and characters of each.
+#: Number of fields that a message names, and number of characters of each.
 _SHOWN, _NAME = 12, 30
-#: Names of FRFs that say their quantity, and of frequencies in rad/s.
+#: Names of FRFs that state their quantity, and of frequencies in rad/s.
 _QUANTITIES = ("accelerance", "inertance", "mobility", "receptance")
 _RADIANS = ("omega", "w")
 #: Names of times, which files of FRFs do not have.
@@ -77,19 +77,20 @@ _TIMES = ("t", "time", "times", "time_s")
 def arrays_of_fields(
     fields: Mapping[str, Any], mapping: FrfMapping, where: str, limit: ReadLimit, *, keeps_shapes: bool = True
 ) -> FrfArrays:
-    """Find the FRFs among the named arrays of a file.
+    """Find the FRFs among the named arrays of a file and return them.
 
     Parameters
     ----------
     fields : mapping
         Arrays by name, structures and groups as mappings inside.
     mapping : FrfMapping
-        Which field is what, where that is not clear.
+        Fields by their meaning, if that is not clear.
     where : str
-        The file, with which messages begin.
+        Name of the file, with which messages begin.
     limit : ReadLimit
+        Limit of memory.
     keeps_shapes : bool
-        Whether the format keeps axes of length 1 and texts as they are, as the checksum of the own layout needs.
+        Whether the format keeps axes of length 1 and texts unchanged, as the checksum of the own layout needs.
 
     Raises
     ------
@@ -111,7 +112,7 @@ def arrays_of_fields(
 
 
 def fields_of(frfs: FrfSet) -> dict[str, NDArray[Any]]:
-    """Arrays of a set, texts as arrays of texts.
+    """Return arrays of a set, texts as arrays of texts.
 
     Raises
     ------
@@ -156,7 +157,7 @@ def _fields_of_setups(setups: SetUps) -> dict[str, NDArray[Any]]:
 
 
 def _setups_of(fields: Mapping[str, Any], where: str) -> SetUps | None:
-    """Set-ups of a file in the own layout."""
+    """Return the set-ups of a file in the own layout."""
     if "setups" not in fields:
         return None
     try:
@@ -175,12 +176,12 @@ def _setups_of(fields: Mapping[str, Any], where: str) -> SetUps | None:
 
 
 def _checksum(fields: Mapping[str, Any]) -> str:
-    """SHA-256 of names, shapes and values: a field that was lost or renamed shows as a changed value does."""
+    """Return the SHA-256 of names, shapes and values, which also changes if a field was lost or renamed."""
     found = hashlib.sha256()
     for name in sorted(fields):
         if name == _CHECKSUM:
             continue
-        if not _is_array(fields[name]):  # added by someone else
+        if not _is_array(fields[name]):  # added by another program
             found.update(name.encode())
             continue
         value = np.asarray(fields[name])
@@ -191,17 +192,17 @@ def _checksum(fields: Mapping[str, Any]) -> str:
 
 
 def _is_array(value: Any) -> bool:
-    """Whether a value holds numbers or texts: no group, no list of groups or cells."""
+    """Return whether a value contains numbers or texts: no group, no list of groups or cells."""
     return np.asarray(value).dtype.kind in "biufcSU"
 
 
 def _values(value: NDArray[Any]) -> NDArray[Any]:
-    """Values in one type and byte order, whatever a program that copied the file has chosen."""
+    """Return values in one type and byte order, whatever a program that copied the file has chosen."""
     return np.ascontiguousarray(value, dtype="<c16" if value.dtype.kind == "c" else "<f8")
 
 
 def _own_arrays(fields: Mapping[str, Any], where: str) -> FrfArrays:
-    """FRFs of a file in the own layout."""
+    """Return FRFs of a file in the own layout."""
     if _MARK not in fields:
         raise FileContentError(f"{where} lacks {_MARK}")
     wrong = next((name for name in _FIELDS if not _is_array(fields.get(name, 0))), None)
@@ -281,7 +282,7 @@ def _mapped_arrays(content: Mapping[str, Any], mapping: FrfMapping, where: str, 
 
 
 def _frequency_unit(path: str) -> str:
-    """Return the unit that the name of a field of frequencies states; empty: Hz, unless the user states another."""
+    """Return the unit in the name of a field of frequencies; empty: Hz, unless the user states another."""
     name = path.rpartition(".")[2].lower()
     return "rad/s" if name in _RADIANS else "Hz" if "hz" in name else ""
 
@@ -305,7 +306,7 @@ def _frfs(
         path, value = _field(flat, name, getattr(mapping, name), where) or ("", None)
         array = np.asarray(value)
         if array.dtype.kind not in "biuf":
-            raise FileContentError(f"{where}: {path} holds no real numbers, which mapping {name}= takes")
+            raise FileContentError(f"{where}: {path} contains no real numbers, which mapping {name}= takes")
         values.append(array.astype(np.float64))
     one, other = values
     if one.shape != other.shape:
@@ -318,7 +319,7 @@ def _frfs(
 
 
 def _number_of_functions(arrays: FrfArrays) -> int | None:
-    """Return how many FRFs stand one by one, each with its own response and excitation; None if they are a matrix."""
+    """Return the number of FRFs stored one by one, with response and excitation each; None if they are a matrix."""
     count, shape = _count(arrays.responses), [n for n in np.shape(arrays.h) if n != 1]
     is_list = count == _count(arrays.excitations) and len(shape) == 2 and count in shape and not arrays.axes
     return count if is_list else None
@@ -329,7 +330,7 @@ def _count(labels: Any) -> int | None:
 
 
 def _one_by_one(arrays: FrfArrays, mapping: FrfMapping, number: int, where: str, limit: ReadLimit) -> FrfArrays:
-    """Put functions, each with a response and an excitation of its own, into a matrix."""
+    """Return functions, each with a response and an excitation, as a matrix."""
     n, namer, kinds = np.size(arrays.freq_hz), mapping.namer, [(False, arrays.h)]
     kinds += [] if arrays.coherence is None else [(True, arrays.coherence)]
     functions = []
@@ -360,7 +361,7 @@ def _one_by_one(arrays: FrfArrays, mapping: FrfMapping, number: int, where: str,
 def _frequencies(
     found: tuple[str, Any], flat: Mapping[str, Any], arrays: FrfArrays, number: int | None, where: str
 ) -> Any:
-    """Frequencies, of a field in its own unit: those of a field, those that the user lists, or first and spacing."""
+    """Return frequencies in the unit of a field: values of a field, listed by the user, or first and spacing."""
     path, values = found
     if path or not isinstance(values, str):
         return np.asarray(values)
@@ -383,19 +384,19 @@ def _frequencies(
 
 
 def _one_number(word: str, flat: Mapping[str, Any], where: str) -> float:
-    """Return a number, or that of a field of this name."""
+    """Return a number, or the number in a field of this name."""
     value = np.ravel(np.asarray(flat.get(word.strip(), word)))
     try:
         (number,) = value.astype(np.float64).tolist()
     except (ValueError, TypeError) as error:
         raise FileContentError(
-            f"{where}: {one_line(word)} in mapping freq_hz= is neither a number nor a field with one number"
+            f"{where}: {one_line(word)} in mapping freq_hz= is not a number or a field with one number"
         ) from error
     return float(number)
 
 
 def _channels(found: Mapping[str, tuple[str, Any] | None], what: str, where: str) -> Any:
-    """Return the channels of a side as `channels_of` takes them: one field, or nodes and directions apart."""
+    """Return the channels of a side for `channels_of`: one field, or separate nodes and directions."""
     apart = found[f"{what}_nodes"], found[f"{what}_directions"]
     if apart == (None, None) or (found[f"{what}s"] is not None and None in apart):
         return _value(found[f"{what}s"])
@@ -416,7 +417,7 @@ def _channels(found: Mapping[str, tuple[str, Any] | None], what: str, where: str
 
 
 def _flattened(content: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """Fields by their paths: structures by points, structure arrays by an index from 1."""
+    """Yield fields by their paths: structures by points, structure arrays by an index from 1."""
     for name, value in content.items():
         if isinstance(value, Mapping):
             yield from _flattened(value, f"{before}{name}.")
@@ -428,14 +429,14 @@ def _flattened(content: Mapping[str, Any], before: str = "") -> Iterator[tuple[s
 
 
 def _field(flat: Mapping[str, Any], name: str, given: Any, where: str) -> tuple[str, Any] | None:
-    """Path and value of a field: the one that the user names, else the only one of a known name.
+    """Return path and value of a field that the user names, or of the only one of a known name.
 
     The path is empty if the user gives the value itself.
     """
     if given is not None and not isinstance(given, str):
         return "", given
     if given is not None:
-        path = given if given in flat else given.replace("(1)", "")  # one structure is no array
+        path = given if given in flat else given.replace("(1)", "")  # a single structure is no array
         if path in flat:
             return path, flat[path]
         if "(:)" in given:
@@ -473,7 +474,7 @@ def _is_direction(word: str) -> bool:
 
 
 def _of_all(flat: Mapping[str, Any], given: str, where: str) -> Any:
-    """Return the arrays of all structures of an array, the first axis counts these."""
+    """Return the arrays of all structures of an array; the first axis counts the structures."""
     before, _, behind = given.partition("(:)")
     values: list[NDArray[Any]] = []
     while (path := f"{before}({len(values) + 1}){behind}") in flat:

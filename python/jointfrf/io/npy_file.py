@@ -19,7 +19,7 @@ __all__ = ["NPY", "npy_values"]
 
 
 def npy_values(path: Path, limit: ReadLimit) -> NDArray[Any]:
-    """Read the array of an NPY file.
+    """Return the array of an NPY file.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def npy_values(path: Path, limit: ReadLimit) -> NDArray[Any]:
 
 
 def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
-    """Read FRFs; a matrix of them needs its axes, which the array does not name."""
+    """Return FRFs; a matrix of them needs its axes, which the array does not name."""
     values, mapping = npy_values(path, limit), reading.mapping
     held = " x ".join(map(str, values.shape))
     if values.dtype.kind != "c":

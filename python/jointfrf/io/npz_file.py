@@ -24,12 +24,12 @@ __all__ = ["NPZ", "npy_array", "npz_fields", "write_npz"]
 
 
 def npz_fields(path: Path, limit: ReadLimit, file: BinaryIO | None = None) -> dict[str, NDArray[Any]]:
-    """Read all arrays of an NPZ file; `file` is the same file if it is open.
+    """Return all arrays of an NPZ file; `file` is the same file if it is open.
 
     Raises
     ------
     FileContentError
-        The file is damaged, holds Python objects, or more than the limit.
+        The file is damaged, contains Python objects, or exceeds the limit.
     """
     with (
         damage_named(path, "an NPZ file", zipfile.BadZipFile, zlib.error, tokenize.TokenError),
@@ -48,23 +48,26 @@ def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path, limit: 
 
 
 def npy_array(file: BinaryIO, size: int, where: str, name: str, limit: ReadLimit) -> NDArray[Any]:
-    """Read one array after the size that it states is checked against the bytes there are, and the limit.
+    """Return one array after a check of its stated size against the bytes in the file, and the limit.
 
     Parameters
     ----------
     file : file
-        Open at the beginning of the array.
+        File, open at the beginning of the array.
     size : int
-        Bytes from there to its end.
+        Number of bytes to the end of the array.
     where, name : str
-        The file and the array in it, for messages.
+        Names of the file and of the array, for messages.
     limit : ReadLimit
+        Limit of memory.
     """
     version = np.lib.format.read_magic(file)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, _, dtype = read(file)
     if dtype.hasobject:
-        raise FileContentError(f"{where} holds Python objects ({name}), which could run any program; save plain arrays")
+        raise FileContentError(
+            f"{where} contains Python objects ({name}), which could run any program; save plain arrays"
+        )
     count = int(np.prod(shape, dtype=object))
     if size != file.tell() + dtype.itemsize * count:
         stated = " x ".join(map(str, shape))
@@ -80,9 +83,9 @@ def write_npz(path: str | PathLike[str], frfs: FrfSet) -> None:
     Parameters
     ----------
     path : path-like
-        In a folder that exists; an older file is replaced as a whole or not at all.
+        Name of the file, in a folder that exists; an older file is replaced as a whole or not at all.
     frfs : FrfSet
-        The FRFs, with coherence, number of averages and coordinates where they are known.
+        FRFs to write, with coherence, number of averages and coordinates if they are known.
 
     Raises
     ------
@@ -91,16 +94,32 @@ def write_npz(path: str | PathLike[str], frfs: FrfSet) -> None:
     OSError
         The file cannot be written; nothing is left behind.
 
+    See Also
+    --------
+    read_frfs : read the FRFs again.
+    write_frfs : write in the format of the suffix.
+
     Notes
     -----
-    The arrays, SI units: ``jointfrf_frfs`` (2, the number of the layout), ``freq_hz`` (n_freq), ``h`` complex
-    (n_freq, n_responses, n_excitations), NaN where there is no FRF, ``responses`` and ``excitations`` (texts such as
-    ``102:+y``), ``quantity`` (text: receptance, mobility, accelerance), ``unit`` (text); where known ``coherence``
-    (shape of h), ``averages`` (n_responses, n_excitations), ``nodes`` (n) and ``coordinates`` (n, 3) in m; of merged
-    sets ``setups`` (names), ``setup_of`` (n_responses, n_excitations), ``setup_gains`` (2: of one set-up, NaN where it
-    is not said, and common), ``setup_repeats`` (n, 3) and ``setup_repeated`` (n_freq, n), as in `SetUps`;
-    ``sha256``, a checksum of all of these, by which a reader sees a damaged file. Layout 1 is the same without it:
-    what a program of one's own writes or edits.
+    The arrays are in SI units:
+
+    - ``jointfrf_frfs``: 2, the number of the layout
+    - ``freq_hz`` (n_freq)
+    - ``h`` complex (n_freq, n_responses, n_excitations), NaN if there is no FRF
+    - ``responses`` and ``excitations``: texts such as ``102:+y``
+    - ``quantity`` (text: receptance, mobility, accelerance) and ``unit`` (text)
+    - ``coherence`` (shape of h) and ``averages`` (n_responses, n_excitations), if known
+    - ``nodes`` (n) and ``coordinates`` (n, 3) in m, if known
+    - ``sha256``: a checksum of all arrays, by which a reader detects a damaged file
+
+    Merged sets have these arrays of `SetUps` in addition:
+
+    - ``setups``: names
+    - ``setup_of`` (n_responses, n_excitations)
+    - ``setup_gains`` (2): of one set-up, NaN if not stated, and common
+    - ``setup_repeats`` (n, 3) and ``setup_repeated`` (n_freq, n)
+
+    Layout 1 is the same without ``sha256``, for files that you write or edit with a separate program.
 
     Examples
     --------

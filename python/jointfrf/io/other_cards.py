@@ -1,4 +1,4 @@
-"""A joint as input of Code_Aster, LS-DYNA and SubDyn, whose inputs are not cards of one kind with the others."""
+"""A joint as input of Code_Aster, LS-DYNA and SubDyn, whose inputs differ from the cards of all other programs."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ __all__ = ["code_aster_cards", "code_aster_equation", "lsdyna_cards", "lsdyna_eq
 
 #: Displacements of Code_Aster by their numbers.
 _ASTER_DOFS = ("DX", "DY", "DZ", "DRX", "DRY", "DRZ")
-#: Numbers in a line of Code_Aster; columns of a field of LS-DYNA, and digits that they leave a number.
+#: Numbers in a line of Code_Aster; columns of a field of LS-DYNA, and digits of a number in it.
 _IN_A_LINE, _COLUMNS, _DIGITS = 4, 10, 4
-#: Mass and inertia of a discrete beam of LS-DYNA, which takes none of zero: kg and kg m^2.
+#: Mass and inertia of a discrete beam of LS-DYNA, which must not be zero: kg and kg m^2.
 _SMALL_MASS, _SMALL_INERTIA = 1e-6, 1e-9
 
 
 def code_aster_cards(link: CardLink) -> list[str]:
-    """Write discrete elements: K_TR_L and A_TR_L, and where there is hysteretic damping H two of stiffness.
+    """Write discrete elements: K_TR_L and A_TR_L, and with hysteretic damping H two elements of stiffness.
 
     K + i H is the sum of K - H without a loss factor, and of H with the loss factor 1 (AMOR_HYST).
     """
@@ -155,7 +155,7 @@ def subdyn_cards(link: CardLink) -> list[str]:
     Raises
     ------
     ValueError
-        There is damping, nodes lie apart from the reference point, or units are not SI.
+        There is damping, nodes are apart from the reference point, or units are not SI.
     """
     if link.damping.any() or link.hysteretic.any():
         raise ValueError(

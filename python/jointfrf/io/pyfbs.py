@@ -1,4 +1,4 @@
-"""To and from pyFBS: arrays with tables of channels, virtual points, and the files that its users keep."""
+"""To and from pyFBS: arrays with tables of channels, virtual points, and files of its users."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from jointfrf.kernel.arguments import check_type
 
 __all__ = ["PyfbsTest", "from_pyfbs", "is_pyfbs_heading", "places_of_sheets", "with_named_files"]
 
-#: What rows and columns of FRFs are, in messages and mappings.
+#: Names of rows and columns of FRFs in messages and mappings.
 _SIDES = ("responses", "excitations")
 #: A mapping entry that names a table of channels, and one that names a file of frequencies.
 _TABLE = re.compile(r".+\.(?:xlsx(?:#.+)?|csv)", re.IGNORECASE)
@@ -33,15 +33,14 @@ _FREQUENCIES = re.compile(r".+\.npy", re.IGNORECASE)
 
 
 class PyfbsTest(NamedTuple):
-    """A test as pyFBS has it.
+    """A test of pyFBS.
 
     Attributes
     ----------
     frfs : FrfSet
-        With coordinates if all channels point along axes; else `places` has the positions.
+        FRFs, with coordinates if all channels point along axes; otherwise `places` has the positions.
     places : tuple of ChannelPlace
-        Position, direction and, of the groupings that were named, side of each translation: what `joint_channels`
-        takes.
+        Position, direction and, for the named groupings, side of each translation, as argument of `joint_channels`.
     """
 
     frfs: FrfSet
@@ -67,13 +66,13 @@ def from_pyfbs(
     Parameters
     ----------
     test : array_like, shape (n_freq,), or VPT
-        Frequency lines in Hz; or a virtual point transformation of pyFBS 1.0 after `apply_vpt`, whose FRFs are taken.
+        Frequency lines in Hz; or a virtual point transformation of pyFBS 1.0 after `apply_vpt`, with its FRFs.
     frf : array_like of complex, three axes in the order of `axes`
-        The FRFs. A `VPT` has its own.
+        FRFs in `unit`; not with a `VPT`, which contains them.
     df_chn, df_imp : DataFrame, mapping of columns, or sequence of mappings
         Tables of channels and impacts: ``Position_1`` to ``Position_3``, ``Direction_1`` to ``Direction_3``, and if
         there are any ``Grouping``, ``Quantity``, ``Description``. Descriptions ``ux`` to ``rz`` and ``fx`` to ``mz``
-        are DOFs of a virtual point. A `VPT` has its own.
+        are DOFs of a virtual point. Not with a `VPT`, which contains them.
     unit : str
         Unit of the FRFs of translations, such as ``m/s^2/N``.
     position_unit : str
@@ -92,16 +91,21 @@ def from_pyfbs(
     Returns
     -------
     PyfbsTest
-        In SI units. Channels at one place and of one grouping share a node, counted from 1 in the order of the tables;
+        FRFs in SI units. Channels at one place and of one grouping share a node, counted from 1 in table order;
         a virtual point has the number of its grouping. A direction along an axis has its name and sign, an oblique one
         the next name that is free at its node.
 
     Raises
     ------
     FileContentError
-        Sizes, names or units do not fit each other; the sentence says which.
+        Sizes, names or units do not match; the message states which.
     ValueError, TypeError
         An argument is missing or wrong.
+
+    See Also
+    --------
+    frfs_of_arrays : FRFs of other arrays.
+    jointfrf.joint_channels : transform from the places to joint DOFs.
 
     Notes
     -----
@@ -131,7 +135,7 @@ def from_pyfbs(
     scale = 1.0
     if found is not None and any(
         own.any() for own in turns
-    ):  # a linear unit of virtual points is one of rotations, too
+    ):  # a linear unit of virtual points is also a unit of rotations
         unit, scale = si_label(found.exponents), found.to_si
     content = FrfArrays(
         freq, h, axes, channels.responses, channels.excitations, "", unit, coherence,
@@ -144,7 +148,7 @@ def from_pyfbs(
 
 
 def _parts(test: Any, frf: Any, df_chn: Any, df_imp: Any) -> tuple[Any, Any, tuple[Any, Any]]:
-    """Return lines, FRFs and tables, of a `VPT` its own."""
+    """Return lines, FRFs and tables; a `VPT` contains its own."""
     if not hasattr(test, "apply_vpt"):
         missing = [name for name, one in (("frf", frf), ("df_chn", df_chn), ("df_imp", df_imp)) if one is None]
         if missing:
@@ -167,7 +171,7 @@ def _length(unit: str) -> float:
 
 
 def is_pyfbs_heading(heading: list[str]) -> bool:
-    """Whether the columns of a table are those of pyFBS."""
+    """Return whether the columns of a table are columns of pyFBS."""
     return POSITION[0] in heading
 
 
@@ -213,12 +217,12 @@ def places_of_sheets(path: Path, position_unit: str) -> tuple[ChannelPlace, ...]
     Raises
     ------
     FileContentError
-        The name has not two sheets, a unit is missing, or a sheet is wrong.
+        The name does not have two sheets, a unit is missing, or a sheet is wrong.
     """
     file, sheets = sheet_names(path)
     if len(sheets) != 2:
         raise FileContentError(
-            f"{path} names {len(sheets)} sheets; name those of channels and impacts, {file.name}#Channels_AB,Impacts_AB"
+            f"{path} names {len(sheets)} sheets; name channels and impacts, {file.name}#Channels_AB,Impacts_AB"
         )
     if not position_unit:
         raise FileContentError(f"{path} has no unit of positions; give unit= with coordinates=mm")
@@ -233,16 +237,18 @@ def with_named_files(path: Path, reading: Reading, limit_gb: float | None) -> tu
     Parameters
     ----------
     path : Path
-        The file of FRFs.
+        Name of the file of FRFs.
     reading : Reading
+        Statements of the user.
     limit_gb : float or None
+        Largest size in memory, GB; see `read_frfs`.
 
     Returns
     -------
     Reading
-        With channels and frequencies in place of the names of files.
+        Statements with channels and frequencies in place of the names of files.
     PyfbsChannels or None
-        The channels of the tables, if there are any.
+        Channels of the tables, if there are any.
 
     Raises
     ------

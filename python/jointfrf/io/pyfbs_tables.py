@@ -1,4 +1,4 @@
-"""Tables of channels and impacts as pyFBS has them: a row for each, with position and direction."""
+"""Tables of channels and impacts of pyFBS: a row for each, with position and direction."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ __all__ = ["POSITION", "PyfbsChannels", "PyfbsRow", "channels_of_tables", "is_ta
 
 #: Columns of the tables.
 POSITION, _DIRECTION = ("Position_1", "Position_2", "Position_3"), ("Direction_1", "Direction_2", "Direction_3")
-#: How far two directions may differ, relative to their length, and channels of one node be apart, m: rounding.
+#: Relative difference of two directions, and distance of channels of one node, m, that rounding may cause.
 _ALONG, _SAME_PLACE = 1e-6, 1e-9
 #: Words of the column Description that name DOFs of a virtual point.
 _VIRTUAL = {f"{letter}{axis}": f"{turn}{axis}" for letters, turn in (("uf", ""), ("rm", "r"))
             for letter in letters for axis in "xyz"}  # fmt: skip
-#: Words that named rotations before pyFBS 1.0, and since then torsion of the interface.
+#: Words for rotations before pyFBS 1.0, and for torsion of the interface since then.
 _EITHER = ("tx", "ty", "tz")
 #: Other words: flexible modes of the interface.
 _FLEXIBLE = ("ex", "ey", "ez", *(f"{letter}{a}{b}" for letter in "sb" for a in "xyz" for b in "xyz" if a != b))
 #: Parts of the column Quantity of a rotation or a moment.
 _TURNING = ("rot", "ang", "moment")
-#: Rows and groupings that a message names.
+#: Number of rows and groupings that a message names.
 _SHOWN = 6
 
 
@@ -43,17 +43,18 @@ class PyfbsRow(NamedTuple):
 
 
 class PyfbsChannels(NamedTuple):
-    """Channels that the rows of two tables stand for.
+    """Channels that the rows of two tables represent.
 
     Attributes
     ----------
     responses, excitations : tuple of Channel
+        Channels of the rows.
     places : tuple of ChannelPlace
         Places of the translations, in the order of the tables.
     coordinates : dict of int to ndarray, shape (3,)
-        m.
+        Positions of the nodes, m.
     oblique : tuple of (str, Channel)
-        Rows whose direction is not the one that the name of their channel stands for.
+        Rows whose direction differs from the direction in the name of their channel.
     """
 
     responses: tuple[Channel, ...]
@@ -64,7 +65,7 @@ class PyfbsChannels(NamedTuple):
 
     @property
     def note(self) -> str:
-        """Say which channels have directions of their own; empty if there is none."""
+        """Return a sentence on channels with oblique directions; empty if there is none."""
         if not self.oblique:
             return ""
         shown = some_of([str(channel) for _, channel in self.oblique], _SHOWN)
@@ -75,7 +76,7 @@ class PyfbsChannels(NamedTuple):
 
 
 def is_table(table: Any) -> bool:
-    """Whether channels are given as a table of positions and directions."""
+    """Return whether channels are given as a table of positions and directions."""
     if isinstance(table, Sequence) and not isinstance(table, str) and len(table):
         table = table[0]
     return all(name in _columns(table) for name in _DIRECTION)
@@ -178,7 +179,7 @@ class _Node(NamedTuple):
         return row.is_virtual == self.row.is_virtual and _at_one_place(row, self.row)
 
     def channel(self, row: PyfbsRow) -> Channel | None:
-        """Return the channel of a direction at this node; None if all its names stand for other directions."""
+        """Return the channel of a direction at this node; None if all its names represent other directions."""
         turn = "r" if row.is_rotation else ""
         for axis, unit in self.axes.items():
             if axis.startswith(turn or ("x", "y", "z")) and np.linalg.norm(np.cross(unit, row.unit)) <= _ALONG:
@@ -206,15 +207,17 @@ def channels_of_tables(
     Parameters
     ----------
     responses, excitations : sequence of PyfbsRow
+        Rows of the tables.
     sides : mapping of grouping to {"j", "k"}, optional
-        Side of the joint of each grouping around it; the places of other groupings are left out. By default all
+        Side of the joint of each grouping around it; the places of further groupings are omitted. By default all
         places, without a side.
 
     Returns
     -------
     PyfbsChannels
-        A virtual point has the number of its grouping as node. Other channels at one place with one grouping have one
-        node, counted from 1, or from the largest virtual point. A direction along an axis has its name and sign. An
+        Channels with their places. A virtual point has the number of its grouping as node. Other channels at one place
+        with one grouping have one node, counted from 1, or from the largest virtual point. A direction along an axis
+        has its name and sign. An oblique direction has the next free name of its node.
         oblique direction has the next free name of its node.
 
     Raises
@@ -263,7 +266,7 @@ def _side_channels(what: str, rows: Sequence[PyfbsRow], nodes: list[_Node], abov
     """Return the channel of each row, for which nodes are added."""
     named: dict[int, Channel] = {}
     first = {i: next(j for j, other in enumerate(rows) if _at_one_place(other, row)) for i, row in enumerate(rows)}
-    # At each place directions along axes take their names before oblique ones take what is left.
+    # At each place, directions along axes get their names first; oblique ones get the remaining names.
     for i in sorted(first, key=lambda i: (first[i], not _along(rows[i].unit), i)):
         row = rows[i]
         there = [node for node in nodes if node.has(row)]

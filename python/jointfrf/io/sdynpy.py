@@ -19,7 +19,7 @@ from jointfrf.kernel.arguments import as_array, check_type, one_line
 
 __all__ = ["from_escdf", "from_sdynpy", "to_escdf", "to_sdynpy"]
 
-#: The function type of FRFs, as in Universal Files, and how ESCDF calls them and time histories.
+#: Function type of FRFs, as in Universal Files, and names of FRFs and time histories in ESCDF.
 _FRF, _FRF_WORDS, _TIME_WORDS = 4, ("frequencyresponse", "frf", "transferfunction", "tf"), ("time", "th")
 #: SI units by how often a receptance is differentiated.
 _UNITS = ("m/N", "m/s/N", "m/s^2/N")
@@ -32,18 +32,18 @@ def from_sdynpy(array: Any, *, unit: str, quantity: str | None = None, source: s
     Parameters
     ----------
     array : sdynpy.TransferFunctionArray, or structured ndarray
-        Any shape; fields ``abscissa`` (Hz), ``ordinate`` and ``coordinate`` (response, reference).
+        Functions in any shape; fields ``abscissa`` (Hz), ``ordinate`` and ``coordinate`` (response, reference).
     unit : str
         Unit of the FRFs, such as ``m/s^2/N``. SDynPy does not store it.
     quantity : {"receptance", "mobility", "accelerance"}, optional
         Quantity of the FRFs; by default the one of `unit`.
     source : str
-        Named in messages.
+        Name of the array in messages.
 
     Returns
     -------
     FrfSet
-        In SI units; NaN where a pair of channels has no FRF.
+        FRFs in SI units; NaN if a pair of channels has no FRF.
 
     Raises
     ------
@@ -51,6 +51,11 @@ def from_sdynpy(array: Any, *, unit: str, quantity: str | None = None, source: s
         The functions are no FRFs, have several frequency axes, or a coordinate has no direction.
     TypeError
         It is no such array.
+
+    See Also
+    --------
+    to_sdynpy : the inverse.
+    read_frfs : read files of SDynPy.
 
     Examples
     --------
@@ -76,19 +81,30 @@ def to_sdynpy(frfs: FrfSet) -> NDArray[Any]:
     Parameters
     ----------
     frfs : FrfSet
-        FRFs that are missing are left out.
+        FRFs to convert; missing ones are omitted.
 
     Returns
     -------
-    ndarray, structured; shape (n_responses, n_excitations), or (n_frfs,) where FRFs are missing
-        ``.view(sdynpy.TransferFunctionArray)`` is an array of SDynPy, and
-        ``numpy.savez(path, data=array, function_type=4)`` a file that ``sdynpy.data.load`` reads. Values are in SI
-        units; the first comment states the unit.
+    ndarray, structured; shape (n_responses, n_excitations), or (n_frfs,) if FRFs are missing
+        Array whose ``.view(sdynpy.TransferFunctionArray)`` is an array of SDynPy. ``sdynpy.data.load`` reads the file
+        of ``numpy.savez(path, data=array, function_type=4)``. Values are in SI units; the first comment states the
+        unit.
 
     Raises
     ------
     ValueError
         There is no FRF, or one is NaN or infinite on some lines only.
+
+    See Also
+    --------
+    from_sdynpy : the inverse.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> frfs = jf.io.frfs_of_arrays([10.0, 20.0], np.ones((2, 1, 1)), ["1:y"], ["1:y"], unit="m/N")
+    >>> jf.io.to_sdynpy(frfs)["abscissa"].tolist()
+    [[[10.0, 20.0]]]
     """
     check_type("frfs", frfs, FrfSet)
     frfs.check_whole()
@@ -116,21 +132,32 @@ def from_escdf(dataset: Any, *, unit: str | None = None, quantity: str | None = 
         (functions, lines), and ``abscissa`` or ``abscissa_start`` and ``abscissa_step``; ``ordinate_unit`` and
         ``abscissa_unit`` if there are any.
     unit : str, optional
-        Unit of the FRFs, where the dataset does not state one that is understood.
+        Unit of the FRFs, if the dataset does not state one that is understood.
     quantity : {"receptance", "mobility", "accelerance"}, optional
         Quantity of the FRFs; by default the one of the unit.
     source : str
-        Named in messages.
+        Name of the dataset in messages.
 
     Returns
     -------
     FrfSet
-        In SI units.
+        FRFs in SI units.
 
     Raises
     ------
     FileContentError
         A property is missing, the functions are no FRFs, or something does not fit.
+
+    See Also
+    --------
+    to_escdf : the inverse.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> frfs = jf.io.frfs_of_arrays([10.0, 20.0], np.ones((2, 1, 1)), ["1:y"], ["1:y"], unit="m/N")
+    >>> jf.io.from_escdf(jf.io.to_escdf(frfs)).quantity
+    'receptance'
     """
     reading = Reading.checked(quantity, unit=unit or "")
     word = str(_property(dataset, "data_type", source)).strip().lower()
@@ -169,18 +196,29 @@ def to_escdf(frfs: FrfSet) -> dict[str, Any]:
     Parameters
     ----------
     frfs : FrfSet
-        FRFs that are missing are left out.
+        FRFs to convert; missing ones are omitted.
 
     Returns
     -------
     dict of str
-        ``data_type``, ``channel``, ``ordinate``, ``ordinate_unit``, ``abscissa``, ``abscissa_unit``: set each as a
-        property of ``escdf.classes.data(name)``.
+        Properties ``data_type``, ``channel``, ``ordinate``, ``ordinate_unit``, ``abscissa``, ``abscissa_unit``: set
+        each as a property of ``escdf.classes.data(name)``.
 
     Raises
     ------
     ValueError
         There is no FRF, or one is NaN or infinite on some lines only.
+
+    See Also
+    --------
+    from_escdf : the inverse.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> frfs = jf.io.frfs_of_arrays([10.0, 20.0], np.ones((2, 1, 1)), ["1:y"], ["1:y"], unit="m/N")
+    >>> jf.io.to_escdf(frfs)["channel"].tolist()
+    [['1Y+', '1Y+']]
     """
     check_type("frfs", frfs, FrfSet)
     frfs.check_whole()
@@ -237,7 +275,7 @@ def _property(dataset: Any, name: str, source: str) -> Any:
 
 
 def _optional(dataset: Any, name: str, otherwise: Any) -> Any:
-    """Return the value of a property; ESCDF reads it from the file when it is indexed."""
+    """Return the value of a property; ESCDF reads it from the file on indexing."""
     found = dataset.get(name) if isinstance(dataset, Mapping) else getattr(dataset, name, None)
     try:
         value = found if found is None or isinstance(found, str | np.ndarray | list | tuple) else found[...]

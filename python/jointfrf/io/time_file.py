@@ -34,7 +34,7 @@ _BEGINNING_OF_MATLAB_7_3 = b"\x89HDF"
 class TimeRecord(NamedTuple):
     """Instants (n,) in s, signals (n, n_sensors) in SI units, names of the sensors, and their quantities.
 
-    A quantity is empty where the file states no unit.
+    A quantity is empty if the file states no unit.
     """
 
     time: FloatArray
@@ -47,27 +47,28 @@ def read_time_record(
     path: str | PathLike[str], *, skip_lines: int = 0, rate: float | None = None, unit: str = "",
     limit_gb: float | None = None,
 ) -> TimeRecord:  # fmt: skip
-    """Read a time record from a text table (CSV) or a MATLAB file.
+    r"""Return a time record from a text table (CSV) or a MATLAB file.
 
     Parameters
     ----------
     path : Path or str
-        A table whose first column is time, with one column for each sensor below a heading such as
-        ``time [s],A/1:y [m/s^2]``; a line below the heading may contain the units. Or a MATLAB file with a vector of
+        Name of a table whose first column is time, with one column for each sensor below a heading such as
+        ``time [s],A/1:y [m/s^2]``; a line below the heading may contain the units. Or of a MATLAB file with a vector of
         instants (``t``, ``time``) or a number (``fs``, ``dt``), and a vector or matrix for the sensors.
     skip_lines : int
-        Lines before the heading of a table, default 0.
+        Number of lines before the heading of a table, default 0.
     rate : float, optional
         Sampling rate in Hz, if the file has no instants or rounds them; all columns without a name of times are then
         sensors.
     unit : str
         Unit of the signals without one, such as ``"g"``, default SI.
     limit_gb : float, optional
-        Memory that the content may take, as in `read_frfs`.
+        Largest size of the content in memory, GB, see `read_frfs`.
 
     Returns
     -------
     TimeRecord
+        Instants and signals.
 
     Raises
     ------
@@ -75,6 +76,21 @@ def read_time_record(
         The file cannot be read, has no instants, or a cell is no number.
     MissingPackageError
         A MATLAB file of version 7.3, and h5py is not installed.
+
+    See Also
+    --------
+    jointfrf.decay_of_mode : frequency and damping over amplitude of a free decay.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import jointfrf as jf
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder) / "decay.csv"
+    ...     _ = path.write_text("time [s],A/1:y [mm/s^2]\n0,0\n0.001,2\n")
+    ...     record = jf.io.read_time_record(path)
+    >>> record.signals[:, 0].tolist(), record.motion
+    ([0.0, 0.002], ('acceleration',))
     """
     where = Path(path)
     check_file(where)
@@ -193,7 +209,7 @@ def _of_matlab(path: Path, limit: ReadLimit) -> tuple[list[str], list[str], Floa
 
 
 def _flat(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the variables, and those inside structures."""
+    """Return the variables, and variables inside structures."""
     found: dict[str, Any] = {}
     for name, value in fields.items():
         found |= _flat(value) if isinstance(value, Mapping) else {name: value}

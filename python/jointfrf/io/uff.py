@@ -45,13 +45,13 @@ __all__ = ["UNIVERSAL_FILE", "read_uff", "write_uff"]
 
 #: Function types of dataset 58.
 _TIME_HISTORY, _FRF, _COHERENCE = 1, 4, 6
-#: Values of a measurement span fewer decades; with their bytes in the wrong order they span hundreds.
+#: Number of decades beyond which values are in the wrong byte order: those of a measurement span fewer.
 _MOST_DECADES = 60
-#: Different kinds of ordinates that a set names.
+#: Number of kinds of ordinates that a message names.
 _SHOWN = 3
-#: Columns of a line of text.
+#: Number of columns of a line of text.
 _WIDTH = 80
-#: Codes of Universal Files by directions.
+#: Codes of directions in Universal Files.
 _CODES = {direction: code for code, direction in DIRECTION_CODES.items()}
 #: Records of the axes of a coherence, which has no unit.
 _COHERENCE_AXES = [axis_record(0, "Coherence", "NONE"), axis_record(0, "NONE", "NONE")]
@@ -62,7 +62,7 @@ _Number = TypeVar("_Number", np.float64, np.complex128)
 
 @dataclass(frozen=True, slots=True)
 class _Frf:
-    """Where an FRF is in the file, and what it means."""
+    """Place of an FRF in the file, and its meaning."""
 
     dataset: int
     header: FunctionHeader
@@ -77,20 +77,20 @@ class _Frf:
 
 @dataclass
 class _Content:
-    """What the headers of the file state.
+    """Content of the headers of the file.
 
     Attributes
     ----------
     frfs : list of _Frf
         FRFs that are wanted and can be used.
     coherences : list of (int, FunctionHeader, (Channel, Channel))
-        The same of coherences: dataset, header, response and reference.
+        Dataset, header, response and reference of coherences.
     functions : dict of int to list of int
         Datasets by the type of their function.
     unusable : dict of str to list of int
         Datasets of FRFs that cannot be used, by the reason.
     numbered : dict of int to set of int
-        Numbers that the nodes of the file have in the set; several if components number nodes alike.
+        Numbers that the nodes of the file have in the set; several if components have equal node numbers.
     """
 
     frfs: list[_Frf] = field(default_factory=list)
@@ -101,7 +101,7 @@ class _Content:
 
 
 class _UnusableFrfError(Exception):
-    """Why an FRF of a sound file is left out."""
+    """Reason for which an FRF of a sound file is omitted."""
 
 
 def read_uff(
@@ -113,52 +113,62 @@ def read_uff(
     limit_gb: float | None = None,
     unit: str = "",
 ) -> FrfSet:
-    """Read the FRFs of a Universal File.
+    """Return the FRFs of a Universal File.
 
     Parameters
     ----------
     path : path-like
-        An ASCII or binary (58b) Universal File.
+        Name of an ASCII or binary (58b) Universal File.
     quantity : {"receptance", "mobility", "accelerance"}, optional
-        What every FRF of the file is, where its data types do not say it or contradict its units. Default: by the
-        file.
+        Quantity of every FRF of the file, if its data types do not state it or contradict its units. By default it
+        follows from the file.
     force_quantity : bool
-        Take `quantity` and `unit` also if data types and units of the file agree on another one.
+        Whether `quantity` and `unit` are used even if data types and units of the file agree on another one, default
+        False.
     nodes : collection of int, optional
-        Read only FRFs between these nodes; all by default. Headers are read first, and then only what is wanted.
+        Nodes between which FRFs are read; all by default. Headers are read first, and then only the wanted FRFs.
     limit_gb, unit : optional
-        As for `read_frfs`.
+        Largest size in GB, and unit of the FRFs; see `read_frfs`.
 
     Returns
     -------
     FrfSet
         All FRFs of motion per force (function type 4), in SI units, channels in the order of the file, with their
-        coherence (function type 6) where the file holds it. Where the file mixes quantities, all are given as the one
-        that is differentiated most often.
+        coherence (function type 6) if the file contains it. If quantities are mixed, all are converted to the one that
+        is differentiated most often.
 
     Raises
     ------
     FileNotFoundError
         There is no such file.
     FileContentError
-        The file cannot be read, lacks something such as a unit, or contradicts `quantity` or `unit`; the message says
-        what, and in which dataset, counted from 1.
+        The file cannot be read, lacks something such as a unit, or contradicts `quantity` or `unit`. The message states
+        the error and the dataset, counted from 1.
 
     Warns
     -----
     FileContentWarning
-        Something was left out; each is reported once, with its datasets. Left out are a dataset that the end of the
-        file cuts short, FRFs without node or direction, of unknown kind or not of motion per force (if no others
-        remain, that is an error), further FRFs between the same channels, a line at 0 Hz that is not a number, local
-        coordinates, coordinates without a unit, FRFs in local directions that cannot be turned.
+        Data were omitted; each kind is reported once, with its datasets:
+
+        - a dataset that the end of the file cuts short
+        - FRFs without node or direction, of unknown kind or not of motion per force (an error if no others remain)
+        - further FRFs between the same channels
+        - a line at 0 Hz that is not a number
+        - local coordinates, and coordinates without a unit
+        - FRFs in local directions that cannot be transformed
+
+    See Also
+    --------
+    read_frfs : read files of any format.
+    write_uff : write a Universal File.
 
     Notes
     -----
-    Units come from the labels of dataset 58. If there are none, the values are divided by the length and force factors
-    of dataset 164, as its definition [1]_ says; coordinates always are. A label that is not understood is an error.
+    Units come from the labels of dataset 58. Without labels, the values are divided by the length and force factors of
+    dataset 164, according to its definition [1]_; coordinates always are. A label that is not understood is an error.
 
-    Directions of nodes with a displacement system of their own (datasets 15, 2411, 18, 2420) become global ones. Axes
-    along global ones rename the channels. Others need all three directions of a node, as responses or as forces.
+    Directions of nodes with a local displacement system (datasets 15, 2411, 18, 2420) become global ones. Axes along
+    global ones only rename the channels. Other axes need all three directions of a node, as responses or as forces.
 
     References
     ----------
@@ -181,7 +191,7 @@ def read_uff(
 
 
 def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfSet:
-    """Read the FRFs of a file; where it is one of several, coherences alone are enough, and FRFs are then NaN."""
+    """Return the FRFs of a file; if it is one of several, coherences alone are enough, and FRFs are then NaN."""
     file = UniversalFile(path, reading)
     content = _describe(file, reading)
     only_coherence = reading.is_part and not content.frfs and not content.unusable and content.coherences
@@ -215,7 +225,7 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfSet:
         try:
             found, left_out = finite_frfs(found)
         except ValueError as error:
-            raise file.error(f"holds no FRF that can be used: {error}") from error
+            raise file.error(f"contains no FRF that can be used: {error}") from error
     reading.notes.extend([*file.notes(), *(f"{path}: {each}" for each in left_out)])
     return found
 
@@ -225,8 +235,8 @@ def _of_nodes(
 ) -> tuple[dict[int, NDArray[np.float64]], NodeAxes]:
     """Return coordinates and local axes of the nodes of the set.
 
-    Nodes that several components have are not named by datasets: they have no coordinates, and axes of their own cannot
-    be computed.
+    Datasets do not distinguish nodes of several components with the same number: these have no coordinates, and their
+    local axes cannot be computed.
     """
     shared = [node for node, numbers in content.numbered.items() if len(numbers) > 1]
     number_of = {node: next(iter(numbers)) for node, numbers in content.numbered.items() if len(numbers) == 1}
@@ -251,8 +261,8 @@ def _in_global_axes(
     columns, excitations, h = global_channels(file, axes, matrix.excitations, h.swapaxes(1, 2))
     if not (responses and excitations):
         raise file.error(
-            "holds FRFs in local directions only; set the displacement system of the nodes to 0 and state directions "
-            "in a channel table"
+            "contains FRFs in local directions only; set the displacement system of the nodes to 0 and state "
+            "directions in a channel table"
         )
     if coherence is not None:
         unknown = (np.array(rows) < 0)[:, None] | (np.array(columns) < 0)
@@ -272,12 +282,12 @@ class _Matrix:
         self.place_of = {pair: (row_of[pair[0]], column_of[pair[1]]) for pair in pairs}
 
     def bytes(self, n_freq: int) -> int:
-        """Return what all its FRFs take."""
+        """Return the number of bytes of all its FRFs."""
         return 16 * n_freq * self.shape[0] * self.shape[1]
 
 
 def _describe(file: UniversalFile, reading: Reading) -> _Content:
-    """Find the FRFs that can be used and are wanted, and what their headers state."""
+    """Return the wanted and usable FRFs, and the content of their headers."""
     content, headers = _Content(), dict[int, FunctionHeader]()
     for number in file.datasets(58):
         with file.damage_named(number):
@@ -309,20 +319,20 @@ def _describe(file: UniversalFile, reading: Reading) -> _Content:
 
 
 def _no_frf(file: UniversalFile, content: _Content, nodes: Collection[int] | None) -> FileContentError:
-    """Error of a file that holds no FRF, none that can be used, or none that is wanted."""
+    """Return the error for a file without any FRF, without a usable one, or without a wanted one."""
     if content.unusable:
         why = "; ".join(f"{reason} ({name_some('dataset', numbers)})" for reason, numbers in content.unusable.items())
-        return file.error(f"holds no FRF that can be used: {why}")
+        return file.error(f"contains no FRF that can be used: {why}")
     if _FRF in content.functions and nodes is not None:
-        return file.error(f"holds no FRF between {name_some('node', sorted(nodes))}")
+        return file.error(f"contains no FRF between {name_some('node', sorted(nodes))}")
     times = f"; {TIME_DATA}" if _TIME_HISTORY in content.functions else ""
-    return file.error(f"holds {file.held_without_frf(content.functions)}{times}")
+    return file.error(f"contains {file.held_without_frf(content.functions)}{times}")
 
 
 def _describe_frf(
     file: UniversalFile, number: int, header: FunctionHeader, channels: tuple[Channel, Channel], reading: Reading
 ) -> _Frf:
-    """Quantity and factor to SI of one FRF."""
+    """Return quantity and factor to SI of one FRF."""
     quantity, forced = reading.quantity, reading.forced
     _check_form(file, number, header)
     numerator, denominator = header.numerator, header.denominator
@@ -333,7 +343,7 @@ def _describe_frf(
     said = ordinate_quantity(numerator, denominator, channels)
     if quantity and said and said != quantity and not forced:
         contradicts = False
-        with suppress(ValueError):  # where the file contradicts itself, the caller decides
+        with suppress(ValueError):  # if the file contradicts itself, the caller decides
             ordinate_factor(numerator, denominator, channels, said, system, uses_labels=True, note=lambda _: None)
             contradicts = True
         if contradicts:
@@ -341,7 +351,7 @@ def _describe_frf(
             raise file.error(contradiction(said, quantity, words))
     found = quantity or said
     if found is None:
-        raise _UnusableFrfError(f"its data types {numerator} per {denominator} do not say what it is; give quantity=")
+        raise _UnusableFrfError(f"data types {numerator} per {denominator} do not state its quantity; give quantity=")
     try:
         by_file, why = ordinate_factor(
             numerator,
@@ -367,7 +377,7 @@ def _describe_frf(
 def _agreed_factor(
     file: UniversalFile, number: int, channels: tuple[Channel, Channel], by_file: float | None, label: str
 ) -> float | None:
-    """Factor to SI by the unit that the user states for translations per force, and by the file."""
+    """Return the factor to SI by the unit that the user states for translations per force, and by the file."""
     stated = file.reading.units.frf_to_si
     if stated is not None and any(channel.is_rotation for channel in channels):
         if by_file is None and stated != 1.0:
@@ -383,19 +393,19 @@ def _agreed_factor(
 
 
 def _check_form(file: UniversalFile, number: int, header: FunctionHeader) -> None:
-    """Raise for forms of dataset 58 that would be read wrongly."""
+    """Raise an error for forms of dataset 58 that would be read wrongly."""
     if header.number_type in (2, 4):
         raise _UnusableFrfError("its values are real numbers, without phase")
     if header.number_type not in (5, 6):
         raise file.error(f"is damaged: ordinate data type {header.number_type} in dataset {number}")
     if not header.is_supported:
-        raise file.error(f"holds binary numbers in dataset {number} that are not IEEE 754 after 11 lines of text")
+        raise file.error(f"contains binary numbers in dataset {number} that are not IEEE 754 after 11 lines of text")
 
 
 def _channels(
     file: UniversalFile, header: FunctionHeader, namer: ChannelNamer, given: Sequence[Any], content: _Content
 ) -> tuple[Channel, Channel]:
-    """Return response and reference: by their names where the user gives them, else by the header."""
+    """Return response and reference: by their names if the user gives them, else by the header."""
     found = []
     sides = ("response", header.response, given[0]), ("reference", header.reference, given[1])
     for role, (entity, node, code), name in sides:
@@ -434,7 +444,7 @@ def _note_repetitions(
     lines: NDArray[np.float64],
     h: NDArray[np.complex128],
 ) -> None:
-    """Take a note of FRFs between the same channels as another one, and how far they differ from the one in use."""
+    """Add notes on repeated FRFs between the same channels, and their difference from the one in use."""
     worst, numbers = (0.0, ""), []
     for kept, frf in again:
         freq_hz, value = _read_function(file, frf.dataset, frf.header, str(frf), np.complex128)
@@ -451,7 +461,7 @@ def _note_repetitions(
 def _as_common(
     frf: _Frf, common: str, freq_hz: NDArray[np.float64], value: NDArray[np.complex128]
 ) -> NDArray[np.complex128]:
-    """Return an FRF in SI units, as the quantity that all are given as."""
+    """Return an FRF in SI units, converted to the common quantity."""
     power = POWER_OF_I_OMEGA[common] - POWER_OF_I_OMEGA[frf.quantity]
     with np.errstate(over="ignore", invalid="ignore"):
         return value * frf.factor * (2j * np.pi * freq_hz) ** power if power else value * frf.factor
@@ -460,7 +470,7 @@ def _as_common(
 def _values(
     file: UniversalFile, frfs: list[_Frf], matrix: _Matrix, limit: ReadLimit
 ) -> tuple[NDArray[np.float64] | None, NDArray[np.complex128] | None, str]:
-    """Frequency lines, the FRFs in SI units, and the one quantity they are all given as."""
+    """Return frequency lines, the FRFs in SI units, and their common quantity."""
     common = max((frf.quantity for frf in frfs), key=POWER_OF_I_OMEGA.__getitem__, default="receptance")
     lines: NDArray[np.float64] | None = None
     h: NDArray[np.complex128] | None = None
@@ -472,7 +482,7 @@ def _values(
             h = np.full((freq_hz.size, *matrix.shape), np.nan + 0j)
         elif not same_lines(lines, freq_hz):
             held = [f"{_lines(f)} in dataset {each.dataset} ({each})" for f, each in ((lines, frfs[0]), (freq_hz, frf))]
-            raise file.error(f"holds FRFs at different frequencies: {held[0]}, {held[1]}")
+            raise file.error(f"contains FRFs at different frequencies: {held[0]}, {held[1]}")
         h[:, *matrix.place_of[frf.channels]] = _as_common(frf, common, freq_hz, value)
     return lines, h, common
 
@@ -480,7 +490,7 @@ def _values(
 def _coherence(
     file: UniversalFile, content: _Content, matrix: _Matrix, lines: NDArray[np.float64] | None, limit: ReadLimit
 ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-    """Frequency lines, and the coherence of the FRFs; None where the file holds none of it."""
+    """Return frequency lines, and the coherence of the FRFs; None if the file contains none of it."""
     found: NDArray[np.float64] | None = None
     for number, header, channels in content.coherences:
         place = next((matrix.place_of[pair] for pair in same_frf(*channels) if pair in matrix.place_of), None)
@@ -489,7 +499,7 @@ def _coherence(
         freq_hz, value = _read_function(file, number, header, f"coherence {channels[0]} / {channels[1]}", np.float64)
         lines = freq_hz if lines is None else lines
         if not same_lines(lines, freq_hz):
-            file.note("coherence left out: its frequency lines are not those of the FRFs", number)
+            file.note("coherence left out: its frequency lines differ from the lines of the FRFs", number)
             continue
         if np.isnan(value[0]) and freq_hz[0] == 0.0:
             value[0] = 0.0  # 0/0: there is no signal
@@ -504,14 +514,14 @@ def _coherence(
             continue
         found[:, *place] = value
     if lines is None:
-        raise file.error("holds no coherence that can be used")
+        raise file.error("contains no coherence that can be used")
     return lines, found
 
 
 def _read_function(
     file: UniversalFile, dataset: int, header: FunctionHeader, name: str, dtype: type[_Number]
 ) -> tuple[NDArray[np.float64], NDArray[_Number]]:
-    """Frequencies in Hz and values in the file's units of one function."""
+    """Return frequencies in Hz and values in the file's units of one function."""
     if header.number_type not in (2, 4, 5, 6):
         raise file.error(f"is damaged: ordinate data type {header.number_type} in dataset {dataset} ({name})")
     with file.damage_named(dataset):
@@ -520,7 +530,7 @@ def _read_function(
     if np.iscomplexobj(value) and dtype is np.float64:
         value = value.real
     if n < 1 or not n <= value.size <= n + 1:
-        raise file.error(f"is damaged: dataset {dataset} ({name}) holds {value.size} of {n} values")
+        raise file.error(f"is damaged: dataset {dataset} ({name}) has {value.size} of {n} values")
     if header.is_binary and _is_scrambled(value):
         raise file.error(f"is damaged: in dataset {dataset} ({name}) the byte order is not the one that is stated")
     freq_hz = lines[:n] * _hertz(file, dataset, header, name)
@@ -530,7 +540,7 @@ def _read_function(
 
 
 def _hertz(file: UniversalFile, dataset: int, header: FunctionHeader, name: str) -> float:
-    """Return the unit of the abscissa in Hz, the one that the user states or the one of the file."""
+    """Return the unit of the abscissa in Hz, stated by the user or by the file."""
     kind, label = header.abscissa.data_type, header.abscissa.label
     if kind not in (0, 1, 18):
         raise file.error(f"gives dataset {dataset} ({name}) over {header.abscissa.name}, not frequency")
@@ -547,7 +557,7 @@ def _hertz(file: UniversalFile, dataset: int, header: FunctionHeader, name: str)
 
 
 def _is_scrambled(value: NDArray[Any]) -> bool:
-    """Whether values reach over more decades than any measurement, as numbers in the wrong byte order do."""
+    """Return whether values span more decades than any measurement, as numbers in the wrong byte order do."""
     parts = abs(np.ascontiguousarray(value).view(np.float64))
     parts = parts[np.isfinite(parts) & (parts > 0.0)]
     return bool(parts.size and np.log10(parts.max()) - np.log10(parts.min()) > _MOST_DECADES)
@@ -570,17 +580,17 @@ def write_uff(
     Parameters
     ----------
     path : path-like
-        In a folder that exists; an older file is replaced as a whole or not at all.
+        Name of the file, in a folder that exists; an older file is replaced as a whole or not at all.
     frfs : FrfSet
-        The FRFs, in the quantity that they have; those that are not there (NaN on all lines) are left out. Coordinates
-        and coherence are written where they are known. The format has no place for numbers of averages.
+        FRFs to write, in their quantity; missing ones (NaN on all lines) are omitted. Coordinates and coherence are
+        written if they are known. The format has no place for numbers of averages.
     title : str
-        One line of ASCII, at most 80 characters, for the header and for every FRF.
+        Title in one line of ASCII, at most 80 characters, for the header and for every FRF.
     binary : bool
-        Dataset 58b: the values as IEEE numbers, little-endian. Unevenly spaced lines are written as text all the
-        same, because programs differ in how they read them from 58b.
+        Whether to write dataset 58b: the values as IEEE numbers, little-endian. Unevenly spaced lines are always
+        written as text, because programs differ in how they read them from 58b.
     single : bool
-        Values in single precision, as most test systems write them, not in double.
+        Whether to write values in single precision, as most test systems do, not in double.
 
     Raises
     ------
@@ -591,13 +601,13 @@ def write_uff(
 
     See Also
     --------
-    jointfrf.io.read_uff : The way back.
+    read_uff : read the FRFs again.
 
     Notes
     -----
     Units are SI and stated twice, by dataset 164 and by the labels of each FRF. The definition of the datasets [1]_ has
     13 columns for a frequency: frequencies of 1 Hz and more come back to 1e-9 of themselves. Values come back to 12
-    digits from text (6 where `single`), exactly from binary. No date is written: the same FRFs give the same bytes.
+    digits from text (6 with `single`), exactly from binary. No date is written: the same FRFs give the same bytes.
 
     References
     ----------

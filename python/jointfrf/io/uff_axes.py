@@ -1,4 +1,4 @@
-"""Nodes of Universal Files: coordinates, and axes of their own in which FRFs and modes at them are given."""
+"""Nodes of Universal Files: coordinates, and local axes of FRFs and modes at them."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["NodeAxes", "global_channels", "node_axes", "node_coordinates"]
 
-#: How far, relative to its length, an axis may differ from one of the global ones: dataset 18 gives six digits.
+#: Largest difference of an axis from a global one, relative to its length: dataset 18 has six digits.
 _TOLERANCE = 1e-5
-#: Labels of the global system; 1 is written by programs that define no system.
+#: Labels of the global system; programs that define no system write 1.
 _GLOBAL = (0, 1)
 #: Kinds of coordinate systems whose axes are known at a node.
 _CARTESIAN, _CYLINDRICAL = 0, 1
@@ -34,8 +34,9 @@ class _System:
     axes : ndarray, shape (3, 3), or None
         Rows are its axes in global components; None if they refer to another system.
     origin : ndarray, shape (3,)
+        Origin, m.
     kind : int
-        0 cartesian, 1 cylindrical, 2 spherical.
+        Kind: 0 cartesian, 1 cylindrical, 2 spherical.
     """
 
     axes: FloatArray | None
@@ -71,18 +72,18 @@ def node_coordinates(file: UniversalFile, nodes: Collection[int]) -> dict[int, N
     Parameters
     ----------
     file : UniversalFile
-        Takes notes of what cannot be used: local coordinates, an unknown unit.
+        File, to which notes are added on data that cannot be used: local coordinates, an unknown unit.
     nodes : collection of int
-        The nodes wanted.
+        Numbers of the nodes.
 
     Returns
     -------
     dict of int to ndarray, shape (3,)
-        Global cartesian coordinates in m of those nodes of which the file gives them.
+        Global cartesian coordinates, m, of the nodes for which the file states them.
 
     Notes
     -----
-    Dataset 2411 holds coordinates of the part; dataset 15 holds them in the definition system of each node.
+    Dataset 2411 contains coordinates of the part; dataset 15 contains them in the definition system of each node.
     """
     coordinates: dict[int, NDArray[np.float64]] = {}
     systems = _coordinate_systems(file)
@@ -105,7 +106,7 @@ def node_coordinates(file: UniversalFile, nodes: Collection[int]) -> dict[int, N
 
 
 def _metre(file: UniversalFile, number: int) -> float | None:
-    """Return the unit of the coordinates of a dataset in m: the one that the user states, else by dataset 164."""
+    """Return the unit of the coordinates of a dataset in m, stated by the user or by dataset 164."""
     system = file.unit_system(number)
     by_file = None if system is None else 1.0 / system.length
     try:
@@ -115,18 +116,20 @@ def _metre(file: UniversalFile, number: int) -> float | None:
 
 
 def node_axes(file: UniversalFile, nodes: Collection[int]) -> dict[int, FloatArray | None]:
-    """Return the axes of those nodes whose displacement system is not the global one.
+    """Return the axes of nodes whose displacement system is not the global one.
 
     Parameters
     ----------
     file : UniversalFile
+        The file.
     nodes : collection of int
+        Numbers of the nodes.
 
     Returns
     -------
     dict of int to ndarray, shape (3, 3), or None
-        Rows are the local axes in global components: global components are local ones times it. None if the file does
-        not define the system, or defines it relative to another one.
+        Axes as rows, in global components: global components are local ones times it. None if the file does not define
+        the system, or defines it relative to another one.
     """
     systems, found = _coordinate_systems(file), dict[int, FloatArray | None]()
     for _, rows in _tables(file, nodes, is_noted=False):
@@ -139,7 +142,7 @@ def node_axes(file: UniversalFile, nodes: Collection[int]) -> dict[int, FloatArr
 
 
 def _is_other(systems: Mapping[int, _System], label: float, *, shifted: bool = False) -> bool:
-    """Whether a label is of a system other than the global one."""
+    """Return whether a label belongs to a system other than the global one."""
     system = systems.get(int(label))
     if system is None:
         return int(label) not in _GLOBAL
@@ -200,7 +203,7 @@ def _systems_by_matrix(records: Sequence[str]) -> dict[int, _System]:
 
 
 def _checked_axes(axes: Sequence[FloatArray] | FloatArray) -> FloatArray:
-    """Return axes that are orthogonal, of length 1 and right-handed; raises ValueError."""
+    """Return axes that are orthogonal, of length 1 and right-handed; raise a ValueError for others."""
     found = np.array(axes, np.float64)
     if not np.allclose(found @ found.T, np.eye(3), atol=10 * _TOLERANCE) or np.linalg.det(found) < 0:
         raise ValueError("axes are not orthogonal")
@@ -210,29 +213,32 @@ def _checked_axes(axes: Sequence[FloatArray] | FloatArray) -> FloatArray:
 def global_channels(
     file: UniversalFile, axes: NodeAxes, channels: Sequence[Channel], h: ComplexArray
 ) -> tuple[list[int], tuple[Channel, ...], ComplexArray]:
-    """Turn channels at nodes with axes of their own into global directions.
+    """Convert channels at nodes with local axes to global directions.
 
     Parameters
     ----------
     file : UniversalFile
-        Takes notes.
+        File, to which notes are added.
     axes : mapping of int to ndarray, shape (3, 3), or None
+        Local axes by node, see `node_axes`.
     channels : sequence of Channel, length m
-        With the directions of the file.
+        Channels with the directions of the file.
     h : ndarray, shape (n_freq, m, p)
-        FRFs with these channels as rows; NaN where there is none.
+        FRFs with these channels as rows; NaN if there is none.
 
     Returns
     -------
     kept : list of int
-        Where each channel that is left comes from: its place among `channels`, or -1 if it is a sum of several.
+        Number of each remaining channel among `channels`, or -1 if it is a sum of several.
     channels : tuple of Channel
+        Remaining channels in global directions.
     h : ndarray, shape (n_freq, len(kept), p)
+        FRFs of the remaining channels.
 
     Notes
     -----
-    Local axes along global ones only rename channels. Others need all three directions of a node; without them the
-    channels are left out.
+    Local axes along global ones only rename channels. Other axes need all three directions of a node; without them the
+    channels are omitted.
     """
     groups: dict[tuple[int, bool], list[int]] = {}
     for i, channel in enumerate(channels):

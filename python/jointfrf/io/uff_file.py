@@ -1,4 +1,4 @@
-"""A Universal File as numbered datasets, found without holding the file in memory; units."""
+"""A Universal File as numbered datasets, indexed without reading the whole file into memory; units."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ __all__ = ["UniversalFile", "index_datasets", "name_some"]
 
 #: The -1 of a delimiter, which blanks may follow up to column 128.
 _DELIMITER = re.compile(rb"-1[ \t]{0,122}(?=[\r\n]|\Z)")
-#: Most blanks before it; numbers in columns have more.
+#: Largest number of blanks before it; numbers in columns have more.
 _INDENT = 5
-#: After binary numbers no line need end.
+#: Pattern after binary numbers, where no line need end.
 _AFTER_NUMBERS = re.compile(rb"\s{0,4}?( {4}-1)[ \t]{0,122}(?=[\r\n]|\Z)")
-#: Bytes that decide whether a place is a delimiter: blanks before and behind, line ends.
+#: Bytes that show whether a place is a delimiter: blanks before and behind, line ends.
 _REACH = 140
-#: Bytes of a dataset from its delimiter on, among which its type stands.
+#: Number of bytes of a dataset from its delimiter on that contain its type.
 _TYPE = 300
-#: Bytes of the file in memory: fewer take longer, more do not take less time.
+#: Number of bytes of the file in memory: fewer take longer, more do not take less time.
 _CHUNK = 1 << 22
-#: Bytes of a value by the data type of record 7, and of the abscissa before it where the spacing is uneven.
+#: Bytes of a value by the data type of record 7, and of the abscissa before it if the spacing is uneven.
 _VALUE_BYTES = {2: 4, 4: 8, 5: 8, 6: 16}
 _ABSCISSA_BYTES = 4
 
 
 class Dataset(NamedTuple):
-    """First byte of the opening delimiter, first byte of the closing one, and the type; 0 where it has none."""
+    """First byte of the opening delimiter, first byte of the closing one, and the type; 0 if it has none."""
 
     start: int
     end: int
@@ -50,12 +50,12 @@ def index_datasets(path: Path) -> tuple[list[Dataset], bool]:
     Parameters
     ----------
     path : Path
-        A file, read in chunks; binary numbers are skipped by their stated length where a delimiter follows them.
+        Name of a file, read in chunks; binary numbers are skipped by their stated length if a delimiter follows them.
 
     Returns
     -------
     list of Dataset
-        Empty where there is no delimiter.
+        Datasets in the order of the file; empty if there is no delimiter.
     bool
         Whether the file ends inside a dataset.
     """
@@ -74,7 +74,7 @@ def index_datasets(path: Path) -> tuple[list[Dataset], bool]:
 
 
 class _Window:
-    """A part of a file, moved along."""
+    """A part of a file that moves along it."""
 
     def __init__(self, file: BinaryIO) -> None:
         self.file, self.start, self.content = file, 0, b""
@@ -88,7 +88,7 @@ class _Window:
         return self.content[place : place + count]
 
     def find(self, position: int) -> tuple[int, int] | None:
-        """Return where the line of the next delimiter begins, and where it ends."""
+        """Return begin and end of the line of the next delimiter."""
         while True:
             before = max(position - _INDENT - 1, 0)  # where its line may begin
             if not self.start <= before < self.start + len(self.content):
@@ -99,7 +99,7 @@ class _Window:
                 return self.start + found[0], self.start + found[1]
             if is_last:
                 return None
-            # Once more from where the window may cut a delimiter.
+            # Again from the place at which the window may cut a delimiter.
             end = self.start + len(self.content)
             position = max(position, end - _REACH) if found is None else self.start + found[0]
             self._move(max(position - _INDENT - 1, 0))
@@ -118,7 +118,7 @@ class _Window:
     def after_binary(self, start: int) -> tuple[int, int] | None:
         """Return begin and end of the delimiter after the binary numbers of a dataset 58b, by their length.
 
-        The one that is stated, or, where no delimiter follows there, the one that record 7 gives: some programs state
+        The stated length is used, or, if no delimiter follows there, the length by record 7: some programs state
         another.
         """
         head = self.part(start, HEAD)
@@ -144,7 +144,7 @@ class _Window:
 
 
 def _length_of_values(record: bytes) -> int:
-    """Return how many bytes the values take that record 7 describes; 0 where it does not say."""
+    """Return the number of bytes of the values by record 7; 0 if it does not state them."""
     try:
         kind, count, is_even = int(record[:10]), int(record[10:20]), int(record[20:30])
     except ValueError:
@@ -160,9 +160,9 @@ def _kind(head: bytes) -> int:
         return 0
 
 
-#: Numbers of datasets or nodes that a sentence names.
+#: Number of datasets or nodes that a message names.
 _NUMBERS_SHOWN = 5
-#: What datasets hold that are not read, for messages.
+#: Content of datasets that are not read, for messages.
 _DATASETS = {
     15: "nodes", 18: "coordinate systems", 55: "data at nodes", 82: "trace lines", 151: "header", 164: "units",
     1858: "qualifiers of dataset 58", 2400: "model header", 2411: "nodes", 2412: "elements", 2414: "analysis data",
@@ -182,7 +182,7 @@ class UniversalFile:
     Raises
     ------
     FileContentError
-        It is no Universal File; every method raises it where the file is damaged.
+        It is no Universal File; every method raises it if the file is damaged.
     """
 
     def __init__(self, path: Path, reading: Reading | None = None) -> None:
@@ -205,12 +205,12 @@ class UniversalFile:
             self.note("ends inside a dataset, which is left out", len(self.types) + 1)
 
     def error(self, sentence: str) -> FileContentError:
-        """Exception whose message is the file's name and a sentence about it."""
+        """Return an exception whose message is the file's name and a sentence about it."""
         return FileContentError(f"{self.path} {sentence}")
 
     @contextmanager
     def damage_named(self, dataset: int) -> Iterator[None]:
-        """Turn what reading a damaged dataset raises into one sentence."""
+        """Turn errors from reading a damaged dataset into one sentence."""
         try:
             yield
         except (ValueError, LookupError, OverflowError) as error:
@@ -219,26 +219,26 @@ class UniversalFile:
             raise self.error(f"is damaged in {where}: {why}; export it again") from error
 
     def note(self, sentence: str, *datasets: int) -> None:
-        """Keep something for the user to know about some datasets."""
+        """Add a note for the user about some datasets."""
         self._notes.setdefault(sentence, []).extend(datasets)
 
     def notes(self) -> list[str]:
-        """Every note once, with the datasets it is about."""
+        """Return every note once, with its datasets."""
         notes = ((text, list(dict.fromkeys(datasets))) for text, datasets in self._notes.items())
         return [f"{self.path}: {text} ({name_some('dataset', datasets)})" for text, datasets in notes]
 
     def datasets(self, *kinds: int) -> list[int]:
-        """Numbers of the datasets of some types."""
+        """Return the numbers of the datasets of some types."""
         if len(kinds) == 1:
             return self._numbers.get(kinds[0], [])
         return sorted(number for kind in kinds for number in self._numbers.get(kind, ()))
 
     def function_name(self, kind: int, count: int = 1) -> str:
-        """Return what a type of function of dataset 58 is called."""
+        """Return the name of a type of function of dataset 58."""
         return f"{_plural(_FUNCTIONS.get(kind, 'function of another kind'), count)} (dataset 58, function type {kind})"
 
     def held_without_frf(self, functions: Mapping[int, Sequence[int]]) -> str:
-        """Say what the file holds: the functions of dataset 58, by their types, or where there are none, datasets."""
+        """Return the content of a file in words: the functions of dataset 58, by their types, or else datasets."""
         if functions:
             held = [f"{len(own)} {self.function_name(kind, len(own))}" for kind, own in functions.items()]
             return f"{', '.join(held)} and no FRF"
@@ -246,7 +246,7 @@ class UniversalFile:
         return f"{_plural('dataset', len(kinds))} {', '.join(kinds)} and no FRF (dataset 58, function type 4)"
 
     def content(self, dataset: int, most: int | None = None) -> bytes:
-        """Bytes of a dataset from its delimiter on, or the first of them."""
+        """Return the bytes of a dataset from its delimiter on, or the first of them."""
         place = self._index[dataset - 1]
         size = place.end - place.start
         with self.path.open("rb") as file:
@@ -254,12 +254,12 @@ class UniversalFile:
             return file.read(size if most is None else min(size, most))
 
     def records(self, dataset: int) -> list[str]:
-        """Lines of a dataset of text after its type, with exponents as Python has them."""
+        """Return the lines of a dataset of text after its type, with exponents in the form of Python."""
         lines = self.content(dataset).decode("utf-8", "replace").splitlines()[2:]
         return [line.replace("D", "E").replace("d", "e") for line in lines]
 
     def unit_system(self, dataset: int) -> UnitSystem | None:
-        """Units of a dataset: the last dataset 164 before it, else the first of the file, else None."""
+        """Return the units of a dataset: the last dataset 164 before it, else the first of the file, else None."""
         if self._systems is None:
             self._systems = {number: self._read_unit_system(number) for number in self.datasets(164)}
         numbers = self.datasets(164)

@@ -33,7 +33,7 @@ __all__ = [
 
 #: The line before and after a dataset.
 DELIMITER = "    -1"
-#: Lines before the numbers: delimiter, type, five of text, records 6 to 11; a 58b states those after the type.
+#: Number of lines before the numbers: delimiter, type, five of text, records 6 to 11; a 58b states it after the type.
 _N_LINES, _N_TEXT_LINES = 13, 11
 
 
@@ -46,23 +46,23 @@ def _cuts(*widths: int) -> list[slice]:
 #: Columns of the type line of 58b, of record 6, of record 7, and of records 8 to 11.
 _BINARY, _PLACE = _cuts(6, 1, 6, 6, 12, 12), _cuts(5, 10, 5, 10, 11, 10, 4, 11, 10, 4)
 _FORM, _AXIS = _cuts(10, 10, 10, 13, 13, 13), _cuts(10, 5, 5, 5, 21, 21)
-#: Which fields of record 6 are numbers.
+#: Fields of record 6 that are numbers.
 _PLACE_NUMBERS = (0, 1, 2, 3, 5, 6, 8, 9)
-#: Columns of an abscissa: by the definition, and as other programs write it before values in double precision.
+#: Columns of an abscissa: by the definition, and in files of other programs before values in double precision.
 _ABSCISSA_WIDTHS = (13, 20)
-#: By the ordinate data type of record 7: bytes of a number, and numbers of a value.
+#: Bytes of a number, and numbers of a value, by the ordinate data type of record 7.
 _NUMBERS = {2: (4, 1), 4: (8, 1), 5: (4, 2), 6: (8, 2)}
-#: By the data types of records 8 to 11.
+#: Quantities by the data types of records 8 to 11.
 _DATA_TYPES = {
     0: "unknown", 1: "general", 2: "stress", 3: "strain", 5: "temperature", 6: "heat flux", 8: "displacement",
     9: "reaction force", 11: "velocity", 12: "acceleration", 13: "excitation force", 15: "pressure", 16: "mass",
     17: "time", 18: "frequency", 19: "rpm", 20: "order",
 }  # fmt: skip
-#: Data types that name no quantity; those of forces; those of motions.
+#: Data types that name no quantity; data types of forces; data types of motions.
 _UNSAID = (0, 1)
 _FORCES = (9, 13)
 _QUANTITY = {8: "receptance", 11: "mobility", 12: "accelerance"}
-#: How far, relative to it, a line may lie from where an even spacing puts it: 13 columns hold as many digits.
+#: Largest relative distance of a line from an even spacing: rounding to 13 columns.
 _EVEN = 1e-9
 
 
@@ -81,19 +81,19 @@ class Axis:
 
     @property
     def words(self) -> str:
-        """The data type and the unit, as they are shown."""
+        """Data type and unit as text."""
         return f"{self.name} [{self.label or 'no unit'}]"
 
     def __str__(self) -> str:
         return f"{self.data_type} ({self.name}, unit '{self.label or 'NONE'}')"
 
 
-@lru_cache(256)  # a file repeats few of them in thousands of functions
+@lru_cache(256)  # a file repeats a few of them in thousands of functions
 def _axis(record: bytes) -> Axis:
-    """Take an axis from its record."""
+    """Return an axis from its record."""
     text = _text(record)
     words = _fields(text, _AXIS, range(4))
-    data_type, *_ = map(int, words[:4])  # and three exponents, which are not used
+    data_type, *_ = map(int, words[:4])  # and three unused exponents
     label = _unit_label(record) if words == _columns(text, _AXIS) else words[5]
     label = "" if label.upper() == "NONE" else label
     return Axis(data_type, label, parse_unit(label))
@@ -112,18 +112,18 @@ def _unit_label(record: bytes) -> str:
     found = []
     for fields in (_text(record)[_AXIS[5]], _text(record[_AXIS[5]])):
         label = fields.strip()
-        if fields[:1].strip() == "" and label not in found:  # a blank before it
+        if fields[:1].strip() == "" and label not in found:  # a blank before the label
             found.append(label)
     labels = [label for label in found if label]
     return "' or '".join(labels)  # which is not understood if there are two
 
 
 class DamagedNumbersError(ValueError):
-    """Where the numbers of a dataset cannot be read, as the end of a sentence."""
+    """The numbers of a dataset cannot be read; the message is the end of a sentence."""
 
 
 class FunctionHeader(NamedTuple):
-    """What the records before the numbers say; of response and reference: entity, node and direction code."""
+    """Content of the records before the numbers; for response and reference: entity, node and direction code."""
 
     kind: int
     response: tuple[str, int, int]
@@ -144,12 +144,12 @@ class FunctionHeader(NamedTuple):
 
 
 def read_header(content: bytes) -> FunctionHeader:
-    """Read the records before the numbers.
+    """Return the header in the records before the numbers.
 
     Parameters
     ----------
     content : bytes
-        The dataset from its delimiter on, or the beginning of it.
+        Bytes of the dataset from its delimiter on, or the beginning of them.
 
     Raises
     ------
@@ -184,23 +184,24 @@ def read_header(content: bytes) -> FunctionHeader:
 
 
 def function_values(content: bytes, header: FunctionHeader) -> tuple[NDArray[np.float64], NDArray[Any]]:
-    """Read the numbers.
+    """Return the numbers of a dataset.
 
     Parameters
     ----------
     content : bytes
-        The dataset from its delimiter on.
+        Bytes of the dataset from its delimiter on.
     header : FunctionHeader
+        Header of the dataset.
 
     Returns
     -------
     abscissa, ordinate : ndarray, shape (n,)
-        As many as there are, whatever the header says; of text without zeros that fill the last line.
+        Numbers in the dataset, even if the header states another count; without zeros that fill the last line of text.
 
     Raises
     ------
     DamagedNumbersError
-        A line of text holds something else than numbers.
+        A line of text contains something else than numbers.
     """
     size, parts = _NUMBERS[header.number_type]
     data = content[header.length :]
@@ -211,10 +212,10 @@ def function_values(content: bytes, header: FunctionHeader) -> tuple[NDArray[np.
 
 
 def _binary_rows(data: bytes, header: FunctionHeader, size: int, parts: int) -> NDArray[np.float64]:
-    """Return what belongs to each value; some programs put line ends after the numbers."""
+    """Return a row of numbers for each value; some programs put line ends after the numbers."""
     order = ">" if header.is_big_endian else "<"
     kinds: list[Any] = [("y", f"{order}f{size}", (parts,))]
-    if not header.is_even:  # of four bytes by the definition, but pyuff writes eight beside double precision
+    if not header.is_even:  # four bytes by the definition, but pyuff writes eight with double precision
         is_long = len(data) >= header.n_values * size * (parts + 1)
         kinds.insert(0, ("x", f"{order}f{size if is_long else 4}"))
     kind = np.dtype(kinds)
@@ -224,10 +225,10 @@ def _binary_rows(data: bytes, header: FunctionHeader, size: int, parts: int) -> 
 
 
 def _text_rows(data: bytes, header: FunctionHeader, size: int, parts: int) -> NDArray[np.float64]:
-    """Return what belongs to each value.
+    """Return a row of numbers for each value.
 
-    By the definition values stand in columns, 6E13.5 in single precision, else 4E20.12, with an abscissa E13.5 before.
-    Numbers between blanks are read whatever their columns are; columns count if numbers touch each other.
+    By the definition values are in columns, 6E13.5 in single precision, else 4E20.12, after an abscissa E13.5. Numbers
+    between blanks are read in any columns; the columns count if numbers touch each other.
     """
     lines = data.decode("ascii", "replace").splitlines(keepends=True)
     width, wanted = 13 if size == 4 else 20, header.n_values
@@ -254,7 +255,7 @@ def _text_rows(data: bytes, header: FunctionHeader, size: int, parts: int) -> ND
 
 
 def _numbers_of(lines: list[str], widths: list[int]) -> list[list[float]]:
-    """Return the numbers of each line, between blanks or in columns of these widths, up to the first line of others."""
+    """Return the numbers of each line, between blanks or in columns of these widths, up to the first other line."""
     cuts = _cuts(*widths * (max(map(len, lines), default=0) // sum(widths) + 1)) if widths else []
     found = []
     try:
@@ -272,20 +273,20 @@ def _numbers_of(lines: list[str], widths: list[int]) -> list[list[float]]:
 
 
 def _number(word: str) -> float:
-    """Return a number of Fortran; NaN for the words that old run-time libraries have for it."""
+    """Return a number of Fortran; NaN for its words in old run-time libraries."""
     text = word.strip().replace("D", "E").replace("d", "e")
-    if "#" in text or (text and not text.strip("*")):  # 1.#QNAN of Windows; stars for what does not fit its columns
+    if "#" in text or (text and not text.strip("*")):  # 1.#QNAN of Windows; stars for numbers that do not fit
         return math.nan
     return float(text)
 
 
 def _columns(record: str, cuts: list[slice]) -> list[str]:
-    """Cut a record into its fields."""
+    """Return the fields of a record."""
     return [record[cut].strip() for cut in cuts]
 
 
 def _fields(record: str, cuts: list[slice], numbers: Iterable[int]) -> list[str]:
-    """Return the fields of a record: in the columns of the definition, or if these hold no numbers, between blanks."""
+    """Return the fields of a record: in the columns of the definition, or without numbers there, between blanks."""
     fields = _columns(record, cuts)
     if all(_is_number(fields[i]) for i in numbers if fields[i]):
         return fields
@@ -302,7 +303,7 @@ def _is_number(word: str) -> bool:
 
 
 def _whole(word: str) -> int:
-    """Return a number that programs leave out."""
+    """Return a whole number, 0 if it is missing."""
     try:
         return int(word)
     except ValueError:
@@ -310,14 +311,14 @@ def _whole(word: str) -> int:
 
 
 def kind_of_frf(numerator: Axis, denominator: Axis) -> str | None:
-    """None for motion per force as far as the data types say, else what it is instead."""
+    """Return None if the data types do not contradict motion per force, else the kind of the function."""
     is_motion = numerator.data_type in (*_QUANTITY, *_UNSAID)
     is_force = denominator.data_type in (*_FORCES, *_UNSAID)
     return None if is_motion and is_force else f"{numerator.name} per {denominator.name}"
 
 
 def ordinate_quantity(numerator: Axis, denominator: Axis, channels: tuple[Channel, Channel]) -> str | None:
-    """Quantity by the data types, by the unit labels where these say nothing; None where neither does."""
+    """Return the quantity by the data types, or by the unit labels; None if both do not determine it."""
     said = numerator.unit.exponents if numerator.unit else None
     said_below = denominator.unit.exponents if denominator.unit else None
     for name, power in POWER_OF_I_OMEGA.items():
@@ -341,14 +342,14 @@ def ordinate_factor(
     uses_labels: bool,
     note: Callable[[str], None],
 ) -> tuple[float | None, str]:
-    """Factor that turns the ordinate into SI units, by the labels or, without labels, by dataset 164.
+    """Return the factor of the ordinate to SI units, by the labels or, without labels, by dataset 164.
 
     Returns
     -------
     float or None
-        None if a unit is missing, not understood or not one of the quantity.
+        Factor; None if a unit is missing, not understood or does not match the quantity.
     str
-        What is wrong then.
+        Reason if there is no factor.
 
     Raises
     ------
@@ -377,14 +378,14 @@ def ordinate_factor(
 
 
 def _exponents(response: Channel, excitation: Channel, power: int) -> tuple[Exponents, Exponents, Exponents]:
-    """Exponents of length, force, time of the motion, of the force or moment, and of their ratio."""
+    """Return exponents of length, force, time of the motion, of the force or moment, and of their ratio."""
     motion = (0 if response.is_rotation else 1, 0, -power)
     force = (1 if excitation.is_rotation else 0, 1, 0)
     return motion, force, (motion[0] - force[0], -1, -power)
 
 
 def _checked(axis: Axis, unit: Unit, system: UnitSystem | None, note: Callable[[str], None]) -> float:
-    """Factor of a label; a note where dataset 164 contradicts it (no system of 164 has g, so g is none)."""
+    """Return the factor of a label; add a note if dataset 164 contradicts it (no system of 164 has g)."""
     by_system = unit.to_si if system is None else system.to_si(unit.exponents)
     if not math.isclose(unit.to_si, by_system, rel_tol=SAME_FACTOR) and not axis.label.lower().startswith("g"):
         note(f"the unit '{axis.label}' contradicts dataset 164: the unit is used")
@@ -402,7 +403,7 @@ def function_dataset(
     binary: bool,
     single: bool,
 ) -> bytes:
-    """Write a function.
+    """Return a function as lines of a dataset.
 
     Parameters
     ----------
@@ -411,12 +412,13 @@ def function_dataset(
     kind : int
         Function type.
     places : str
-        Response and reference, by `place_fields`.
+        Response and reference, from `place_fields`.
     axes : list of str
-        Records 9 and 10, by `axis_record`.
+        Records 9 and 10, from `axis_record`.
     freq_hz, values : ndarray, shape (n_freq,)
+        Frequencies, Hz, and values.
     binary, single : bool
-        As for `write_uff`.
+        Form and precision of the values; see `write_uff`.
     """
     start, step = _spacing(freq_hz)
     is_even, is_complex = step is not None, np.iscomplexobj(values)
@@ -441,17 +443,17 @@ def function_dataset(
 
 
 def place_fields(node: int, direction_code: int) -> str:
-    """Write the fields of record 6 that name a response or a reference."""
+    """Return the fields of record 6 that name a response or a reference."""
     return f"{'NONE':<10}{node:10d}{direction_code:4d}"
 
 
 def axis_record(data_type: int, label: str, unit: str) -> str:
-    """Write one of the records 8 to 11."""
+    """Return one of the records 8 to 11."""
     return f"{data_type:10d}{0:5d}{0:5d}{0:5d} {label:<20} {unit:<20}"
 
 
 def _spacing(freq_hz: NDArray[np.float64]) -> tuple[str, str | None]:
-    """First line and spacing as they are written; no spacing where it is uneven."""
+    """Return first line and spacing as text; no spacing if it is uneven."""
     step = (freq_hz[-1] - freq_hz[0]) / max(freq_hz.size - 1, 1)
     texts = _short(freq_hz[0]), _short(step)
     written = float(texts[0]) + float(texts[1]) * np.arange(freq_hz.size)
@@ -462,7 +464,7 @@ def _spacing(freq_hz: NDArray[np.float64]) -> tuple[str, str | None]:
 def _text_lines(
     freq_hz: NDArray[np.float64], values: NDArray[np.complex128] | NDArray[np.float64], is_even: bool, single: bool
 ) -> list[str]:
-    """Record 12: four or six numbers a line; with an uneven spacing, each value after its frequency."""
+    """Return record 12: four or six numbers a line; with an uneven spacing, each value after its frequency."""
     numbers = [f"{x:13.5E}" if single else f"{x:20.11E}" for x in np.ascontiguousarray(values).view(np.float64)]
     if is_even:
         a_line = 6 if single else 4
@@ -474,6 +476,6 @@ def _text_lines(
 
 
 def _short(value: float) -> str:
-    """Write a number in 13 columns, with its point and as many digits as they hold."""
+    """Return a number in 13 columns, with its point and as many digits as possible."""
     texts = (f"{value:#.{digits}g}" for digits in range(12, 4, -1))
     return f"{next(text for text in texts if len(text) < 13):>13}"

@@ -8,12 +8,12 @@ __all__ = ["note_exponential_windows"]
 
 #: Window types of record 2 with an exponential window: exponential; impact and exponential.
 _EXPONENTIAL = (4, 6)
-#: Columns of the window type in record 2 (12I6), of the damping factor of an exponential window in record 4 (1P5E15.7).
+#: Columns of the window type in record 2 (12I6), and of the damping factor in record 4 (1P5E15.7).
 _TYPE, _FACTOR = slice(6, 12), slice(60, 75)
 
 
 def note_exponential_windows(file: UniversalFile) -> None:
-    """Note exponential windows that the file states: its definition does not state the unit of their damping factor."""
+    """Note exponential windows in the file; the definition does not state the unit of their damping factor."""
     for number in file.datasets(1858):
         records = [*file.records(number), *[""] * 4]
         try:

@@ -48,13 +48,13 @@ class Unit:
 
 @dataclass(frozen=True)
 class UnitSystem:
-    """What values in a file's units are divided by to give m and N (dataset 164 of Universal Files)."""
+    """Divisors of values in a file's units that give m and N (dataset 164 of Universal Files)."""
 
     length: float
     force: float
 
     def to_si(self, exponents: Exponents) -> float:
-        """Factor to SI of a quantity with these exponents of length, force and time."""
+        """Return the factor to SI of a quantity with these exponents of length, force and time."""
         return self.length ** -exponents[0] * self.force ** -exponents[1]
 
 
@@ -63,7 +63,7 @@ _POUND, _GRAVITY, _INCH, _CYCLE = 4.4482216152605, 9.80665, 0.0254, 2 * math.pi
 #: Quantities of FRFs by exponents of length, force and time.
 QUANTITIES = {(1, -1, 0): "receptance", (1, -1, -1): "mobility", (1, -1, -2): "accelerance"}
 _LENGTH, _FORCE, _TIME, _MOMENT = (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0)
-#: Symbols with the prefixes that they take, and words, of which a word begins with the name of a prefix.
+#: Symbols with their prefixes, and words, of which some begin with the name of a prefix.
 _UNITS: tuple[tuple[str, str, str, Unit], ...] = (
     ("m", "numck", "meter metre meters metres", Unit(1.0, _LENGTH)),
     ("", "", "micron microns", Unit(1e-6, _LENGTH)),
@@ -91,7 +91,7 @@ _UNITS: tuple[tuple[str, str, str, Unit], ...] = (
 )
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
 _PREFIX_WORDS = {"nano": 1e-9, "micro": 1e-6, "milli": 1e-3, "centi": 1e-2, "kilo": 1e3, "mega": 1e6}
-#: Words that take the name of a prefix: the others are no units of SI.
+#: Words that take the name of a prefix; all further words are no units of SI.
 _PREFIXED = ("meter", "metre", "inch", "newton", "second", "hertz", "radian")
 
 
@@ -118,38 +118,38 @@ def _without_capitals(symbols: dict[str, Unit]) -> dict[str, Unit]:
 
 _SYMBOLS = dict(_names())
 _SMALL = _without_capitals(_SYMBOLS)
-#: Signs as the grammar has them. Latin-1 readers of UTF-8 leave Â before signs.
+#: Signs and their form in the grammar. Latin-1 readers of UTF-8 leave Â before signs.
 _SIGNS = str.maketrans(
     {"×": "*", "·": "*", "⋅": "*", "∙": "*", "•": "*", "−": "-", "–": "-", "μ": "u", "µ": "u", "º": "°",
      "[": "(", "]": ")", "{": "(", "}": ")", "<": "(", ">": ")", "'": None, "’": None, "`": None, '"': None}
 )  # fmt: skip
 _STRAY, _RAISED = re.compile("Â(?=[°²³µ·])"), re.compile("[⁺⁻⁰¹²³⁴-⁹]+")
-#: A pound or a kilogram of force, a point that abbreviates or multiplies.
+#: A pound or a kilogram of force; a point that abbreviates or multiplies.
 _OF_FORCE = re.compile(r"\b(lb|pound|kg|kilogram)s?[\s_-]*(?:\(\s*f(?:orce)?\s*\)|f(?:orce)?)(?![a-z])", re.IGNORECASE)
 _ABBREVIATION, _POINT = re.compile(r"(?<=[A-Za-z])\.(?=\s|$|[/*)^])"), re.compile(r"(?<!\d)\.|\.(?!\d)")
 #: A number, a name or a sign of a unit.
 _TOKEN = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?|[a-z]+|[-^*/()]", re.IGNORECASE)
 #: A level and its reference: ``dB re 1 m/N``, ``dB (ref 1 (m/s^2)/N)``.
 _LEVEL = re.compile(r"[(\[{ ]*db ?[(\[{,]? ?(?:re|rel|ref|reference)\b ?[.:=]? ?(?:to\b)?(.+)", re.IGNORECASE)
-#: Letters of the longest label that is read.
+#: Number of letters of the longest label that is read.
 _LONGEST = 200
-#: How far a factor that a file gives may differ from that of its unit, relative to it: files give four digits or more.
+#: Largest relative difference of a factor in a file from the factor of its unit: files have four digits or more.
 SAME_FACTOR = 1e-3
 
 
 def parse_unit(label: str) -> Unit | None:
-    """Read a unit label.
+    """Return the unit of a label.
 
     Parameters
     ----------
     label : str
-        Products, quotients and whole powers of symbols or words, in any brackets. If the label has a name that is not
-        known, all its names are read without capitals, except those that then mean two things.
+        Products, quotients and whole powers of symbols or words, in any brackets. If the label has an unknown name, all
+        its names are read without capitals, except names that then mean two things.
 
     Returns
     -------
     Unit or None
-        None if the label is empty, NONE or not understood.
+        Unit; None if the label is empty, NONE or not understood.
 
     Examples
     --------
@@ -175,7 +175,7 @@ def parse_unit(label: str) -> Unit | None:
 
 
 def _plain(label: str) -> str:
-    """Return a label in the signs of the grammar."""
+    """Return a label with the signs of the grammar."""
     text = " ".join(_STRAY.sub("", label.replace("\0", " ")).split())
     text = _RAISED.sub(lambda found: "^" + unicodedata.normalize("NFKC", found[0]), text)
     text = unicodedata.normalize("NFKC", text.translate(_SIGNS)).translate(_SIGNS).replace("°", "deg")
@@ -243,12 +243,12 @@ class _Expression:
 
 
 def parse_frequency_unit(label: str) -> float | None:
-    """Read a unit of frequency.
+    """Return the factor to Hz of a unit of frequency.
 
     Parameters
     ----------
     label : str
-        Such as Hz, kHz, rad/s, rpm. ``1/s`` is not understood, because it may be Hz or rad/s.
+        Name of the unit, such as Hz, kHz, rad/s, rpm. ``1/s`` is not understood, because it may be Hz or rad/s.
 
     Returns
     -------
@@ -346,12 +346,12 @@ class StatedUnits:
 
     @property
     def level(self) -> str:
-        """The unit of the FRFs if it is one of levels, else empty."""
+        """Unit of the FRFs if it is a unit of levels, else empty."""
         return self.frf if parse_level(self.frf) else ""
 
     @property
     def ratio(self) -> str:
-        """The unit of the FRFs, of levels that of their reference."""
+        """Unit of the FRFs, or the reference of levels."""
         return parse_level(self.frf) or self.frf
 
     @property
@@ -368,7 +368,7 @@ class StatedUnits:
 
     @property
     def quantity(self) -> str:
-        """The quantity of FRFs in this unit; empty if none is stated."""
+        """Quantity of FRFs in this unit; empty if none is stated."""
         return _quantity_of(self.ratio)
 
 
@@ -377,7 +377,7 @@ def _quantity_of(label: str) -> str:
     return "" if unit is None else QUANTITIES.get(unit.exponents, "")
 
 
-#: Whether the unit of a quantity that a user states is understood, and what to write.
+#: Check whether the unit of a quantity that a user states is understood, and a remedy.
 _UNDERSTOOD = {
     "frf": lambda label: bool(_quantity_of(label)),
     "frequency": lambda label: parse_frequency_unit(label) is not None,
@@ -399,10 +399,11 @@ class ModelUnits:
     Attributes
     ----------
     name : str
+        Name of the system.
     length, mass, time : float
-        What one unit is in m, kg, s.
+        Units in m, kg, s.
     words : str
-        Its units of length, force and time, for comments.
+        Units of length, force and time, for comments.
     """
 
     name: str
@@ -413,18 +414,18 @@ class ModelUnits:
 
     @property
     def system(self) -> UnitSystem:
-        """The same as dataset 164 of Universal Files has it."""
+        """The system in the form of dataset 164 of Universal Files."""
         return UnitSystem(1.0 / self.length, self.time**2 / (self.mass * self.length))
 
     def scale(self, seconds: int, rotations: int = 0) -> float:
-        """Return what one unit of a matrix entry is in SI units.
+        """Return the unit of a matrix entry in SI units.
 
         Parameters
         ----------
         seconds : int
-            0 of a mass, 1 of viscous damping, 2 of a stiffness.
+            Kind of the matrix: 0 for a mass, 1 for viscous damping, 2 for a stiffness.
         rotations : int
-            How many of its two DOFs are rotations: N/m, N, N m/rad.
+            Number of rotations among its two DOFs: N/m, N, N m/rad.
 
         Examples
         --------

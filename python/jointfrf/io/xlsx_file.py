@@ -19,12 +19,12 @@ from jointfrf.spelling import did_you_mean, some_of
 __all__ = ["is_sheet", "read_sheet", "sheet_names"]
 
 _SUFFIX = ".xlsx"
-#: Sheets that a message names.
+#: Number of sheets that a message names.
 _SHOWN = 12
 
 
 def is_sheet(path: Path) -> bool:
-    """Whether a path names a workbook, or sheets of one: ``test.xlsx``, ``test.xlsx#Channels_AB``."""
+    """Return whether a path names a workbook, or sheets of one: ``test.xlsx``, ``test.xlsx#Channels_AB``."""
     return path.name.partition("#")[0].lower().endswith(_SUFFIX)
 
 
@@ -35,19 +35,19 @@ def sheet_names(path: Path) -> tuple[Path, list[str]]:
 
 
 def read_sheet(path: Path, sheet: str | None = None) -> TextTable:
-    """Read a sheet: the first row that is not empty is the heading.
+    """Return a sheet as a table: the first row that is not empty is the heading.
 
     Parameters
     ----------
     path : Path
-        The workbook.
+        Name of the workbook.
     sheet : str, optional
-        Its name; the only one by default.
+        Name of the sheet; the only one by default.
 
     Returns
     -------
     TextTable
-        Cells as texts, numbers as Python writes them; rows without a value are left out.
+        Cells as texts, numbers in the form of Python; rows without a value are omitted.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def read_sheet(path: Path, sheet: str | None = None) -> TextTable:
     check_file(path)
     others = (zipfile.BadZipFile, zlib.error, SyntaxError, LookupError, AttributeError)
     with damage_named(path, "an Excel workbook", *others), path.open("rb") as stream, warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of styles and validations, which are not read
+        warnings.simplefilter("ignore", UserWarning)  # for styles and validations, which are not read
         _check_parts(path)
         book = openpyxl.load_workbook(stream, read_only=True, data_only=True, keep_links=False)
         name = _chosen(path, sheet, list(book.sheetnames))
@@ -74,7 +74,7 @@ def read_sheet(path: Path, sheet: str | None = None) -> TextTable:
 
 
 def _check_parts(path: Path) -> None:
-    """Check what the parts of the file unfold to, and that none defines entities."""
+    """Check the unpacked size of the parts of the file, and that none defines entities."""
     limit = ReadLimit(path)
     with zipfile.ZipFile(path) as archive:
         for part in archive.infolist():

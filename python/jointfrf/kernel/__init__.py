@@ -1,5 +1,6 @@
-"""The way into the compiled kernel: the only room that imports `jointfrf._kernel`.
+"""Interface to the compiled kernel: the only package that imports `jointfrf._kernel`.
 
-`arguments` checks what a caller passes, in memory or in a file; `call` runs a routine over the frequency lines, turns
-their status into exceptions and warnings, and chooses the engine; `linear_algebra` holds what has no physics.
+`arguments` checks the arguments of a caller, in memory or in a file; `call` runs a routine over the frequency lines,
+turns their status into exceptions and warnings, and chooses the engine; `linear_algebra` contains functions without
+physics.
 """

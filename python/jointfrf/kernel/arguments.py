@@ -1,6 +1,6 @@
-"""What the kernel takes: arrays, DOFs, frequencies and words of a caller, checked once and converted to its form.
+"""Arguments of the kernel: arrays, DOFs, frequencies and words of a caller, checked once and converted to its form.
 
-Arrays in files (`numpy.memmap`) are processed in chunks of lines, so that they never lie in memory as a whole.
+Arrays in files (`numpy.memmap`) are processed in chunks of lines, so that they are never in memory as a whole.
 """
 
 from __future__ import annotations
@@ -57,21 +57,21 @@ __all__ = [
 ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]
 
-#: Divisors are not taken below the smallest normal number.
+#: Smallest divisor, the smallest normal number.
 TINY = float(np.finfo(np.float64).tiny)
-#: Characters of a value that a message shows.
+#: Number of characters of a value in a message.
 _SHOWN = 80
-#: Types of the arrays that the kernel takes.
+#: Types of arrays in the kernel.
 _COMPLEX, _REAL = np.dtype(np.complex128), np.dtype(np.float64)
 
-#: A conversion that copies more than this many bytes causes a `CopyWarning`.
+#: Number of bytes above which a conversion that copies causes a `CopyWarning`.
 LARGE_COPY = 16 * 2**20
-#: Arrays in files are processed in chunks of lines; inputs and result of one chunk take about this many bytes.
+#: Approximate number of bytes of inputs and result of one chunk of lines; arrays in files are processed in chunks.
 CHUNK_BYTES = 64 * 2**20
-#: Lines that the kernel takes as one share, of large matrices and of small ones; chunks are multiples of it, so that
-#: they change no bit of a result.
+#: Number of lines in one share of the kernel, for large matrices and for small ones; chunks are multiples of it, so
+#: that they change no bit of a result.
 _SHARE, _LONG_SHARE = 64, 512
-#: Sweeps of so many lines are one chunk, whatever their size.
+#: Number of lines up to which a sweep is one chunk, for any size.
 ONE_CHUNK = 2 * _SHARE - 1
 
 
@@ -96,7 +96,7 @@ def _converted(name: str, value: ArrayLike, dtype: np.dtype[Any], *, later: bool
     array = as_array(name, value)
     if array.dtype.kind not in ("biufc" if dtype is _COMPLEX else "biuf"):
         wanted = "numbers" if dtype is _COMPLEX else "real numbers"
-        raise TypeError(f"{name} must hold {wanted}, not {array.dtype}")
+        raise TypeError(f"{name} must contain {wanted}, not {array.dtype}")
     if later and is_mapped(array):
         return array
     result: NDArray[Any] = np.ascontiguousarray(array, dtype=dtype).reshape(array.shape)
@@ -107,7 +107,7 @@ def _converted(name: str, value: ArrayLike, dtype: np.dtype[Any], *, later: bool
 
 
 def _fits(value: object, rows: int | None, columns: int | None, n_freq: int | None) -> bool:
-    """Whether a value is what `as_lines` returns: the case that must cost nothing."""
+    """Return whether a value already has the form of `as_lines`, without any cost."""
     if type(value) is np.ndarray and value.dtype is _COMPLEX and value.ndim == 3 and value.flags.c_contiguous:
         lines, n, m = value.shape
         return (n_freq is None or lines == n_freq) and (rows is None or n == rows) and (columns is None or m == columns)
@@ -142,15 +142,15 @@ def as_square(name: str, value: ArrayLike, n_freq: int | None = None, *, later: 
     if type(value) is np.ndarray and value.dtype is _COMPLEX and value.ndim == 3 and value.flags.c_contiguous:
         lines, n, m = value.shape
         if n == m and (n_freq is None or lines == n_freq):
-            return value  # the case that must cost nothing
+            return value  # the case that must be fast
     array = as_lines(name, value, n_freq=n_freq, later=later)
     if array.shape[1] != array.shape[2]:
-        raise ValueError(f"{name} must hold square matrices, not {array.shape[1]} x {array.shape[2]}")
+        raise ValueError(f"{name} must contain square matrices, not {array.shape[1]} x {array.shape[2]}")
     return array
 
 
 def as_joint_lines(name: str, value: ArrayLike, n: int | None, n_freq: int) -> ComplexArray:
-    """Return joint matrices (n_freq, n, n) for `run`; one matrix (n, n) serves all lines."""
+    """Return joint matrices (n_freq, n, n) for `run`; one matrix (n, n) is valid for all lines."""
     array = as_array(name, value)
     if array.ndim == 2:
         one = as_square(name, array[None])
@@ -166,7 +166,7 @@ def as_interface(name: str, value: ArrayLike, n_freq: int | None = None) -> tupl
     """Return a sweep at joint DOFs j, then k, for `run`, and the number of joint DOFs."""
     lines = as_square(name, value, n_freq, later=True)
     if lines.shape[1] % 2 or lines.shape[1] == 0:
-        raise ValueError(f"{name} must hold DOFs j and k, an even number of rows, not {lines.shape[1]}")
+        raise ValueError(f"{name} must contain DOFs j and k, an even number of rows, not {lines.shape[1]}")
     return lines, lines.shape[1] // 2
 
 
@@ -179,9 +179,9 @@ def as_real(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Float
     if not fits:
         wanted = ", ".join("n" if w is None else str(w) for w in shape)
         raise ValueError(f"{name} must have shape ({wanted}), not {array.shape}")
-    if np.count_nonzero(np.isfinite(array)) != array.size:  # a few entries are counted faster than reduced
+    if np.count_nonzero(np.isfinite(array)) != array.size:  # for a few entries, counting is faster than reducing
         where = np.unravel_index(int(np.argmin(np.isfinite(array))), array.shape)
-        raise ValueError(f"{name} holds NaN or Inf at index {tuple(int(i) for i in where)}")
+        raise ValueError(f"{name} contains NaN or Inf at index {tuple(int(i) for i in where)}")
     return array
 
 
@@ -194,24 +194,24 @@ def as_frequency(freq_hz: ArrayLike, n_freq: int | None = None) -> FloatArray:
 
 
 def optional_frequency(freq_hz: ArrayLike | None, n_freq: int) -> FloatArray | None:
-    """Return the frequency lines where the caller gave them to name a bad line."""
+    """Return the frequency lines if the caller gave them for messages about a singular line."""
     return None if freq_hz is None else as_frequency(freq_hz, n_freq)
 
 
 def one_line(value: object) -> str:
-    """Show a value in a few words of one line."""
+    """Return a value as a few words of one line."""
     words = " ".join(reprlib.repr(value).split())
     return words if len(words) <= _SHOWN else words[: _SHOWN - 3] + "..."
 
 
 def check_choice(name: str, value: object, known: Sequence[str]) -> None:
-    """Raise unless the value is one of the words that are known."""
+    """Raise an error unless the value is one of the known words."""
     if not isinstance(value, str) or value not in known:
         raise ValueError(f"{name} must be one of {', '.join(known)}, not {one_line(value)}")
 
 
 def check_type(name: str, value: object, kind: type) -> None:
-    """Raise unless an argument is an object of the class that it must be of."""
+    """Raise an error unless an argument is an object of the given class."""
     if not isinstance(value, kind):
         raise TypeError(f"{name} must be a {kind.__name__}, not {type(value).__name__}")
 
@@ -221,11 +221,11 @@ def as_names(name: str, value: object) -> tuple[str, ...]:
     if isinstance(value, Iterable) and not isinstance(value, str):
         listed = list(value)
         if all(isinstance(each, str) for each in listed):
-            # Models have tens of thousands: all at once, and one by one where one is wrong.
+            # Models have tens of thousands of names: all are checked at once, and one by one if one is wrong.
             together = " ".join(listed)
             if together and together.splitlines() != [together]:
                 split = next(each for each in listed if each and each.splitlines() != [each])
-                raise ValueError(f"{name} must hold names without line breaks, not {one_line(split)}")
+                raise ValueError(f"{name} must contain names without line breaks, not {one_line(split)}")
             return tuple(map(str, listed))
     raise TypeError(f"{name} must be a sequence of names, not {one_line(value)}")
 
@@ -250,14 +250,14 @@ def as_integer(name: str, value: object) -> int:
 
 
 def as_limits(name: str, lower: object, upper: object) -> None:
-    """Raise unless two bounds are real numbers, infinite ones among them."""
+    """Raise an error unless two bounds are real numbers, possibly infinite."""
     for value in (lower, upper):
         if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating) or value != value:
             raise TypeError(f"{name} must be real numbers, not {one_line(value)}")
 
 
 def check_finite_lines(name: str, lines: ComplexArray, freq_hz: FloatArray | None = None) -> None:
-    """Raise if a line holds NaN or Inf, and name the first one and its frequency."""
+    """Raise an error if a line contains NaN or Inf, and name the first one and its frequency."""
     broken = np.flatnonzero(~np.isfinite(lines).all(axis=(1, 2)))
     if broken.size:
         where = "" if freq_hz is None else f" ({freq_hz[broken[0]]:g} Hz)"
@@ -293,7 +293,7 @@ def as_not_negative(name: str, value: object, unit: str = "") -> float:
 
 
 def as_probability(name: str, value: object) -> float:
-    """Return one number between 0 and 1, neither of them."""
+    """Return one number above 0 and below 1."""
     number = as_number(name, value)
     if not 0 < number < 1:
         raise ValueError(f"{name} must lie between 0 and 1, not {number:g}")
@@ -301,7 +301,7 @@ def as_probability(name: str, value: object) -> float:
 
 
 def as_count(name: str, value: object, least: int = 1) -> int:
-    """Return a whole number that is not too small; floats without a fraction serve, too."""
+    """Return a whole number that is not too small; floats without a fraction are accepted, too."""
     number = as_number(name, value)
     if number < least or number != int(number):
         raise ValueError(f"{name} must be a whole number, at least {least}, not {value}")
@@ -317,7 +317,7 @@ def as_values(name: str, value: ArrayLike, n: int) -> ComplexArray:
 
 
 def as_dofs(name: str, dofs: ArrayLike, n: int, *, unique: bool = True) -> NDArray[np.int32]:
-    """Return DOF indices, counted from 0 by the caller, as the kernel counts them (from 1)."""
+    """Return DOF indices counted from 1 for the kernel, from DOFs that the caller counts from 0."""
     array = as_array(name, dofs)
     if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
         raise TypeError(f"{name} must be a list of DOF numbers")
@@ -333,7 +333,7 @@ def as_dofs(name: str, dofs: ArrayLike, n: int, *, unique: bool = True) -> NDArr
 def as_dof_pairs(
     of_a: tuple[str, ArrayLike, int], of_b: tuple[str, ArrayLike, int]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Return the joint DOFs of two structures as `as_dofs` does, each by name, DOFs and how many there are."""
+    """Return the joint DOFs of two structures in the form of `as_dofs`, each by name, DOFs and number of DOFs."""
     a, b = as_dofs(*of_a), as_dofs(*of_b)
     if a.size != b.size or a.size == 0:
         raise ValueError(
@@ -354,14 +354,14 @@ def checked_out(
 
 
 def check_apart(out: ComplexArray, array: NDArray[Any], sweeps: Mapping[str, NDArray[Any]]) -> None:
-    """Raise if `out` shares memory with an argument. Two arrays that both own their memory (no `base`) share none."""
+    """Raise an error if `out` shares memory with an argument. Arrays without a `base` own their memory."""
     if np.may_share_memory(out, array):
         names = [name for name, sweep in sweeps.items() if sweep is array]
         raise ValueError(f"out must not share memory with {names[0] if names else 'an argument'}")
 
 
 def check_out(out: ComplexArray, shape: tuple[int, ...]) -> None:
-    """Raise unless `out` is an array of complex numbers of this shape, in C order, aligned and writeable."""
+    """Raise an error unless `out` is a complex array of this shape, in C order, aligned and writeable."""
     if type(out) is np.ndarray and out.shape == shape and out.dtype is _COMPLEX and out.flags.carray:
         return
     if not isinstance(out, np.ndarray):
@@ -371,7 +371,7 @@ def check_out(out: ComplexArray, shape: tuple[int, ...]) -> None:
     if out.shape != shape:
         raise ValueError(f"out must have shape {shape}, not {out.shape}")
     if out.dtype != np.complex128:
-        raise ValueError(f"out must hold complex128, not {out.dtype}")
+        raise ValueError(f"out must contain complex128, not {out.dtype}")
     if not (out.flags.c_contiguous and out.flags.aligned):
         raise ValueError("out must be contiguous in C order and aligned")
     if not out.flags.writeable:
@@ -379,7 +379,7 @@ def check_out(out: ComplexArray, shape: tuple[int, ...]) -> None:
 
 
 def is_mapped(array: NDArray[Any]) -> bool:
-    """Whether an array lies in a file."""
+    """Return whether an array is in a file."""
     base: Any = array
     while isinstance(base, np.ndarray):
         base = base.base
@@ -387,7 +387,7 @@ def is_mapped(array: NDArray[Any]) -> bool:
 
 
 def in_one_piece(result: NDArray[np.complex128], sweeps: Mapping[str, NDArray[Any]]) -> bool:
-    """Whether a sweep is so small that it is never processed in chunks."""
+    """Return whether a sweep is so small that it is never processed in chunks."""
     size = result.nbytes
     for sweep in sweeps.values():
         size += 16 * sweep.size
@@ -395,24 +395,24 @@ def in_one_piece(result: NDArray[np.complex128], sweeps: Mapping[str, NDArray[An
 
 
 def chunks(result: NDArray[np.complex128], sweeps: Mapping[str, NDArray[Any]]) -> Iterator[slice]:
-    """Return ranges of lines: one, unless an array lies in a file or one matrix stands for all lines."""
+    """Return ranges of lines: one, unless an array is in a file or one matrix is valid for all lines."""
     step = n_freq = result.shape[0]
     size = result.nbytes + sum(16 * sweep.size for sweep in sweeps.values())
     if size > CHUNK_BYTES and any(a.strides[0] == 0 or is_mapped(a) for a in (result, *sweeps.values())):
         step = CHUNK_BYTES * n_freq // size
         step = max(_SHARE, step - step % (_LONG_SHARE if step >= _LONG_SHARE else _SHARE))
-    # fewer lines than a share belong to the chunk before
+    # fewer lines than a share belong to the previous chunk
     firsts = range(0, max(1, n_freq - _SHARE + 1), step)
     for first in firsts:
         yield slice(first, n_freq if first == firsts[-1] else first + step)
 
 
 def release(lines: NDArray[Any]) -> None:
-    """Release the pages of a file in memory; what was written stays in the file."""
+    """Release the pages of a file in memory; written data stay in the file."""
     base: Any = lines
     while isinstance(base.base, np.ndarray):
         base = base.base
-    # In mode "c" what was written would be lost; otherwise mapped memory is no more than a view of the file.
+    # In mode "c" written data would be lost; otherwise mapped memory is no more than a view of the file.
     pages = base.base
     if not (isinstance(base, np.memmap) and base.mode != "c" and isinstance(pages, mmap.mmap)):
         return

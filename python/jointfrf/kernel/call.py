@@ -1,4 +1,4 @@
-"""Calling a routine of the kernel, how each line went, and the engine that computes.
+"""Calls of kernel routines, status of each line, and the engine that computes.
 
 A C-order array (n_freq, out, in) enters as its transposed view, so nothing is copied; results come back in C order.
 """
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if sys.platform == "win32":
-    # Loads the LAPACK: Windows looks for DLLs beside the program, not beside what links to them.
+    # Loads the LAPACK: Windows searches DLLs next to the program, not next to the library that links to them.
     import scipy_openblas32  # noqa: F401
 
 import jointfrf._kernel as _kernel
@@ -53,25 +53,24 @@ __all__ = [
 
 OnSingular = Literal["raise", "nan"]
 
-#: Below this reciprocal condition number (1-norm) a result is called ill-conditioned: fewer than four digits may be
-#: left.
+#: Reciprocal condition number (1-norm) below which a result is ill-conditioned: fewer than four digits may be left.
 RCOND_LIMIT = 1e-12
 
-#: Values of `LineStatus.line_info`, and of `info`, as in `status.f90`.
+#: Values of `LineStatus.line_info`, and of `info`, see `status.f90`.
 _LINE_NOT_FINITE = -1
 _LINE_OVERFLOW = -2
 _LINE_SINGULAR = 1  # or any other number above 0, LAPACK's INFO
 #: Version of the kernel, and so of the package.
 VERSION = ".".join(str(int(number)) for number in _kernel.jf_version())
-#: Value of `info` where this processor cannot run the engine, as in `status.f90`.
+#: Value of `info` if this processor cannot run the engine, see `status.f90`.
 _NO_ENGINE = -1001
-#: What callers may say.
+#: Names of engines for callers.
 _ON_SINGULAR = get_args(OnSingular)
-#: Types of the arrays that the kernel takes.
+#: Types of arrays in the kernel.
 _COMPLEX, _INTEGER = np.dtype(np.complex128), np.dtype(np.int32)
-#: Looked up once: a call of one line takes two microseconds.
+#: Looked up once, because a call of one line takes two microseconds.
 _empty, _ndarray = np.empty, np.ndarray
-#: Stands for the number of lines among the arguments of a kernel routine.
+#: Placeholder of the number of lines among the arguments of a kernel routine.
 N_FREQ = object()
 Engine = Literal["auto", "lapack", "plain", "x86-64-v2", "x86-64-v3", "x86-64-v4"]
 
@@ -82,10 +81,11 @@ class LineStatus(NamedTuple):
     Attributes
     ----------
     line_info : ndarray of int32, shape (n_freq,)
-        0 good; > 0 singular (LAPACK's INFO); -1 NaN or Inf in the line; -2 its result overflows.
+        Status: 0 is good, above 0 is singular (INFO of LAPACK), -1 is NaN or Inf in the line, -2 is overflow of its
+        result.
     rcond : ndarray, shape (n_freq,)
-        Reciprocal condition number of the worst matrix inverted; 0 in a bad line. In the 1-norm of the stored matrix
-        with |re| + |im| for the modulus, within a factor 2; an estimate where the fast engines solve.
+        Reciprocal condition number of the worst inverted matrix; 0 in a bad line. In the 1-norm of the stored matrix
+        with |re| + |im| for the modulus, within a factor 2; an estimate if a fast engine solves.
     """
 
     line_info: NDArray[np.int32]
@@ -93,12 +93,12 @@ class LineStatus(NamedTuple):
 
     @property
     def lowest_rcond(self) -> float:
-        """The lowest reciprocal condition number; 1 where there are no lines."""
+        """Lowest reciprocal condition number; 1 if there are no lines."""
         return self.rcond.item(self.rcond.argmin()) if self.rcond.size else 1.0
 
 
 def _line_names(lines: NDArray[np.intp], freq_hz: FloatArray | None) -> str:
-    """Return the first few lines in words."""
+    """Return a text with the first few lines."""
     some = [f"line {i}" + (f" ({freq_hz[i]:g} Hz)" if freq_hz is not None else "") for i in lines[:3]]
     more = f" and {lines.size - 3} more" if lines.size > 3 else ""
     return ", ".join(some) + more
@@ -158,7 +158,7 @@ def check_lines(
 
 
 def _check_info(routine: str, info: int) -> None:
-    """Raise the error of a negative `info`."""
+    """Raise an error for a negative `info`."""
     if info == _NO_ENGINE:
         word = reprlib.repr(os.environ.get("JOINTFRF_ENGINE"))
         raise ValueError(
@@ -180,37 +180,38 @@ def run(
     out: ComplexArray | None = None,
     singular_rcond: float = 0.0,
 ) -> tuple[ComplexArray, NDArray[np.int32], FloatArray]:
-    """Call a kernel routine; of few lines it takes less time than one call of numpy.linalg.
+    """Call a kernel routine; for few lines it takes less time than one call of numpy.linalg.
 
     Parameters
     ----------
     routine : str
-        Name without ``jf_``, used in messages too.
+        Name without ``jf_``, also for messages.
     args : sequence
         Arguments of the routine in the order of `fortran/api/api.F90`, up to the result; arrays in C order, `N_FREQ`
         for the number of lines.
     shape : tuple of int
         Shape of the result in C order, (n_freq, out, in).
     sweeps : mapping of str to ndarray
-        Arguments that have a line axis, by the name the caller knows, to name a bad one. They may lie in a file or be
-        one matrix broadcast to all lines; they are then converted in chunks.
+        Arguments that have a line axis, by their name for the caller, for messages. They may be in a file or one matrix
+        broadcast to all lines; they are then converted in chunks.
     freq_hz : ndarray or None
         Frequencies in Hz for messages.
     on_singular : {"raise", "nan"}
         Whether bad lines (singular, NaN or Inf inside, overflow) raise an error or become NaN.
     rcond_limit : float
-        Below this reciprocal condition number a line causes an `IllConditionedWarning`.
+        Reciprocal condition number below which a line causes an `IllConditionedWarning`.
     out : ndarray or None
-        Where the result goes. All lines are done before a bad one raises: `out` then holds the good lines, and NaN in
-        the bad ones.
+        Array for the result. All lines are computed before a bad one raises an error: `out` then contains the good
+        lines, and NaN in the bad ones.
     singular_rcond : float
-        Below this reciprocal condition number a line is singular to working precision, as in LAPACK's expert drivers.
+        Reciprocal condition number below which a line is singular to working precision, as in LAPACK's expert drivers.
 
     Returns
     -------
     result : ndarray, shape `shape`
+        Result of the routine.
     line_info, rcond : ndarray, shape (n_freq,)
-        As of `LineStatus`.
+        Status of the lines, see `LineStatus`.
     """
     if type(on_singular) is not str or on_singular not in _ON_SINGULAR:
         check_choice("on_singular", on_singular, _ON_SINGULAR)
@@ -271,12 +272,12 @@ def _run_in_chunks(
 
 
 def _argument(value: Any, lines: slice, sweeps: Mapping[str, NDArray[Any]]) -> Any:
-    """Return an argument as the kernel takes it for these lines."""
+    """Return an argument in the form of the kernel for these lines."""
     if value is N_FREQ:
         return lines.stop - lines.start
     if not isinstance(value, np.ndarray):
         return value
-    # f2py copies what has another type or order: the chunk, not the whole.
+    # f2py copies arrays of another type or order: the chunk, not the whole.
     return (value[lines] if any(value is sweep for sweep in sweeps.values()) else value).T
 
 
@@ -286,7 +287,7 @@ def call(routine: str, args: Sequence[Any]) -> None:
 
 
 def call_for_number(routine: str, args: Sequence[Any]) -> tuple[float, ...]:
-    """Call as `call` does a routine that returns numbers before its `info`; return all, an `info` > 0 included."""
+    """Call a routine that returns numbers before its `info`, like `call`; return all, an `info` > 0 included."""
     views = [a.T if isinstance(a, np.ndarray) else a for a in args]
     numbers = tuple(map(float, getattr(_kernel, "jf_" + routine)(*views)))
     _check_info(routine, int(numbers[-1]))
@@ -294,31 +295,40 @@ def call_for_number(routine: str, args: Sequence[Any]) -> tuple[float, ...]:
 
 
 def info_of(routine: str, args: Sequence[Any]) -> int:
-    """Call a kernel routine as `call` does and return its `info` for the caller to judge."""
+    """Call a kernel routine like `call` and return its `info` for the caller to check."""
     views = [a.T if isinstance(a, np.ndarray) else a for a in args]
     return int(getattr(_kernel, "jf_" + routine)(*views))
 
 
 def set_engine(engine: Engine) -> None:
-    """Choose the engine of all calls that follow, in every thread of this process.
+    """Choose the engine of all later calls, in every thread of this process.
 
     Parameters
     ----------
     engine : {"auto", "lapack", "plain", "x86-64-v2", "x86-64-v3", "x86-64-v4"}
-        "auto": the widest vector registers this machine has. "lapack": line by line, the reference. The others:
-        eight lines side by side, with the instructions of any processor or of a level of x86-64 (v3 has AVX2, v4
-        AVX-512).
+        Name of the engine:
+
+        - "auto": the widest vector registers of this machine
+        - "lapack": line by line, the reference
+        - "plain": eight lines side by side, with the instructions of any processor
+        - "x86-64-v2", "x86-64-v3", "x86-64-v4": the same with the instructions of a level of x86-64 (v3 has AVX2, v4
+          AVX-512)
 
     Raises
     ------
     ValueError
-        The word is not known, or this machine does not have the engine; the choice stays as it was.
+        The word is unknown, or this machine does not have the engine; the choice is unchanged.
+
+    See Also
+    --------
+    use_engine : an engine inside a `with` block.
+    get_engine : the engine in use.
 
     Notes
     -----
     Without a call the environment variable `JOINTFRF_ENGINE` chooses, by the same words; it is read when a sweep is
-    first computed. Results of two engines agree within the rounding that the condition of a line allows, and so do
-    those of one line among different neighbours; the number of threads changes nothing.
+    first computed. Results of two engines agree within the rounding that the condition of a line allows. Results of one
+    line among different neighbours agree to the same degree; the number of threads changes nothing.
 
     Examples
     --------
@@ -334,18 +344,22 @@ def set_engine(engine: Engine) -> None:
 
 
 def get_engine() -> Engine:
-    """Return the engine in use; where the choice is automatic, the one that was chosen.
+    """Return the engine in use; if the choice is automatic, the chosen one.
 
     Returns
     -------
     str
-        One of the words of `set_engine`, never "auto".
+        Name of the engine, one of the words of `set_engine`, never "auto".
 
     Raises
     ------
     ValueError
-        The environment variable `JOINTFRF_ENGINE` holds a word that is not known, or names an engine that this machine
-        does not have.
+        The environment variable `JOINTFRF_ENGINE` contains an unknown word, or names an engine that this machine does
+        not have.
+
+    See Also
+    --------
+    set_engine : choose an engine.
 
     Examples
     --------
@@ -362,17 +376,21 @@ def get_engine() -> Engine:
 
 @contextmanager
 def use_engine(engine: Engine) -> Iterator[None]:
-    """Choose an engine inside a `with` block, in every thread of this process; then return to the one before.
+    """Choose an engine inside a `with` block, in every thread of this process; then restore the earlier one.
 
     Parameters
     ----------
     engine : str
-        As in `set_engine`.
+        Name of the engine; see `set_engine`.
 
     Raises
     ------
     ValueError
-        As in `set_engine` and `get_engine`.
+        An error of `set_engine` or `get_engine`.
+
+    See Also
+    --------
+    set_engine : choose an engine for all later calls.
 
     Examples
     --------

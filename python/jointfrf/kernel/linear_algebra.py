@@ -17,28 +17,28 @@ def invert(
     on_singular: OnSingular = "raise",
     out: ComplexArray | None = None,
 ) -> ComplexArray:
-    """Inverse of every line.
+    """Return the inverse of every line.
 
     Parameters
     ----------
     a : array_like, shape (n_freq, n, n)
         One matrix a line.
     freq_hz : array_like, shape (n_freq,), optional
-        Frequencies in Hz, to name a bad line.
+        Frequencies, Hz, for the message about a singular line.
     on_singular : {"raise", "nan"}
-        Whether a bad line raises or becomes NaN, in this line only.
+        Whether a singular line raises an error (default) or becomes NaN, in this line only.
     out : ndarray of complex128, shape (n_freq, n, n), optional
-        Where the result goes, in C order, without memory in common with an input; a new array by default.
+        Array for the result, in C order, without memory in common with an input; a new array by default.
 
     Returns
     -------
     ndarray, shape (n_freq, n, n)
-        `out` where it was given.
+        Inverses; `out` if it was given.
 
     Raises
     ------
     SingularLineError
-        A line is singular. All lines are done first: `out` holds the good ones, and NaN in the bad ones.
+        A line is singular. All lines are computed first: `out` contains the good ones, and NaN in the singular ones.
     OverflowError
         The result of a line overflows.
     ValueError
@@ -47,12 +47,17 @@ def invert(
     Warns
     -----
     IllConditionedWarning
-        rcond of a line is below `jointfrf.RCOND_LIMIT`.
+        The reciprocal condition number of a line is below `jointfrf.RCOND_LIMIT`.
+
+    See Also
+    --------
+    solve : solution with right-hand sides.
+    sweep : lines of a sweep larger than memory.
 
     Notes
     -----
     Input and `out` may be `numpy.memmap` larger than memory: they are processed in chunks of lines, with
-    bit-identical results. `set_engine` chooses what inverts the lines.
+    bit-identical results. `set_engine` chooses the engine.
 
     Examples
     --------
@@ -67,7 +72,7 @@ def invert(
 
 
 def reciprocal_condition(a: ArrayLike) -> FloatArray:
-    """Reciprocal condition number 1/(|A| |A^-1|) of every line.
+    """Return the reciprocal condition number 1/(|A| |A^-1|) of every line.
 
     Parameters
     ----------
@@ -77,11 +82,15 @@ def reciprocal_condition(a: ArrayLike) -> FloatArray:
     Returns
     -------
     ndarray, shape (n_freq,)
-        0 where the line is singular or holds NaN or Inf.
+        Reciprocal condition number; 0 if the line is singular or contains NaN or Inf.
+
+    See Also
+    --------
+    invert : the inverse, with a warning for ill-conditioned lines.
 
     Notes
     -----
-    In the infinity norm with |re| + |im| for the modulus: within a factor 2 of that with the modulus itself.
+    In the infinity norm with |re| + |im| for the modulus, which is within a factor 2 of the norm with the modulus.
 
     Examples
     --------
@@ -102,7 +111,7 @@ def solve(
     on_singular: OnSingular = "raise",
     out: ComplexArray | None = None,
 ) -> ComplexArray:
-    """Solve A X = B on every line.
+    """Return the solution of A X = B on every line.
 
     Parameters
     ----------
@@ -111,16 +120,21 @@ def solve(
     b : array_like, shape (n_freq, n, n_rhs)
         Right-hand sides.
     freq_hz, on_singular, out
-        As in `invert`.
+        Frequencies, Hz, treatment of singular lines, and array for the result; see `invert`.
 
     Returns
     -------
     ndarray, shape (n_freq, n, n_rhs)
+        Solutions X.
 
     Raises
     ------
     SingularLineError, ValueError
-        As in `invert`.
+        An error of `invert`.
+
+    See Also
+    --------
+    invert : inverse of every line.
 
     Examples
     --------
@@ -139,6 +153,6 @@ def solve(
 def solve_lines(
     a: ComplexArray, b: ComplexArray, freq_hz: FloatArray | None, on_singular: OnSingular, singular_rcond: float
 ) -> ComplexArray:
-    """Solve as `solve` does for checked arrays; below `singular_rcond` a line is singular."""
+    """Return solutions like `solve` for checked arrays; below `singular_rcond` a line is singular."""
     args = (a.shape[1], b.shape[2], N_FREQ, a, b)
     return run("solve", args, b.shape, {"a": a, "b": b}, freq_hz, on_singular, singular_rcond=singular_rcond)[0]

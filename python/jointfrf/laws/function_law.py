@@ -17,9 +17,9 @@ __all__ = ["FunctionLaw"]
 
 #: Kinds of its parameters.
 _KINDS = ("stiffness", "damping", "time", "number")
-#: Relative step of the differences that derivatives are compared with, and how far they may lie apart.
+#: Relative step of the differences that check derivatives, and their tolerance.
 _STEP, _APART = 1e-5, 1e-4
-#: Where derivatives are compared, rad/s.
+#: Angular frequencies of this check, rad/s.
 _PLACES = 2 * np.pi * np.array([3.0, 30.0, 300.0])
 
 
@@ -30,20 +30,25 @@ class FunctionLaw(JointLaw):
     Parameters
     ----------
     function : callable
-        ``function(omega, values)`` returns K*(w), shape (n_freq,), N/m (N, N m/rad); omega in rad/s.
+        Function ``function(omega, values)`` that returns K*(w), shape (n_freq,), N/m (N, N m/rad); omega in rad/s.
     derivatives : callable
-        ``derivatives(omega, values)`` returns the derivatives by each value, shape (p, n_freq).
+        Function ``derivatives(omega, values)`` that returns the derivatives by each value, shape (p, n_freq).
     fields : sequence of (name, kind) or (name, kind, lower, upper), or of LawField
-        The parameters; kind is "stiffness", "damping", "time" or "number". Those of the first two must be factors: with
-        the others zero K*(w) is proportional to each.
+        Parameters; kind is "stiffness", "damping", "time" or "number". Stiffnesses and dampings must be factors: K*(w)
+        is proportional to each if all further ones are zero.
     values : array_like, shape (p,)
-        Their values; a fit starts from those that are times and numbers.
+        Values of the parameters; times and numbers are initial values of a fit.
 
     Raises
     ------
     ValueError
-        Values outside the bounds; a shape that is not right; derivatives that are not those of the function, by
-        differences at 3, 30 and 300 Hz.
+        Values outside the bounds; a wrong shape; derivatives that differ from differences of the function at 3, 30 and
+        300 Hz.
+
+    See Also
+    --------
+    LawJoint : joint of laws.
+    SpringLaw : springs and dampers.
 
     Examples
     --------
@@ -108,7 +113,7 @@ class FunctionLaw(JointLaw):
 
     @property
     def fields(self) -> tuple[LawField, ...]:
-        """The parameters: names, kinds and bounds."""
+        """Parameters: names, kinds and bounds."""
         return self._fields
 
     @property

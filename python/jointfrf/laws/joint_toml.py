@@ -39,11 +39,11 @@ _BY_WORD: dict[str, type[JointLaw]] = {
 
 
 def _law_of(word: str) -> type[JointLaw]:
-    """Return the law of a word; raises FileContentError where a plugin cannot be used."""
+    """Return the law of a word; raise FileContentError if a plugin cannot be used."""
     if word in _BY_WORD:
         return _BY_WORD[word]
     entry = law_of_plugin(word)
-    assert entry is not None  # checked where the word was read
+    assert entry is not None  # the word was checked when it was read
 
     def is_law(found: type[JointLaw]) -> bool:
         declared = all(isinstance(number, LawField) for number in _numbers(found))
@@ -58,12 +58,12 @@ def _numbers(law: type[JointLaw]) -> tuple[LawField, ...]:
 
 
 def takes_in_words() -> str:
-    """Return which parameters each law takes, for the reference of keys."""
+    """Return the parameters of each law, for the reference of keys."""
     return "; ".join(f"`{law.word}` {', '.join(f'`{one.name}`' for one in _numbers(law))}" for law in _BY_WORD.values())
 
 
 def parameters_in_words() -> str:
-    """Return what the parameters of all laws are, each as the first law that has it describes it."""
+    """Return the meaning of the parameters of all laws, each from the first law that has it."""
     by_name: dict[str, LawField] = {}
     for law in _BY_WORD.values():
         for number in _numbers(law):
@@ -92,7 +92,7 @@ class ConstantsKeys(Keys):
     damping: Annotated[Any, key("Viscous damping.", "N s/m, N m s/rad", takes=_ByDof)] = None
     loss_factor: Annotated[Any, key("Hysteretic loss factor of each DOF.", takes="list of numbers")] = None
     structural_damping: Annotated[
-        Any, key("Hysteretic damping, beside that of loss factors.", "N/m, N m/rad", takes=_ByDof)
+        Any, key("Hysteretic damping, added to the damping by loss factors.", "N/m, N m/rad", takes=_ByDof)
     ] = None
     at: _At = None
 
@@ -100,7 +100,7 @@ class ConstantsKeys(Keys):
 class DofLawKeys(Keys):
     """The law of a joint DOF, or of a pair of DOFs."""
 
-    dof: Annotated[str | None, key("Name of the DOF.", absent="required but for a cross term")] = None
+    dof: Annotated[str | None, key("Name of the DOF.", absent="required except for a cross term")] = None
     between: Annotated[
         tuple[str, str] | None, key("Two DOFs: a symmetric cross term.", takes="the names of two DOFs")
     ] = None
@@ -108,7 +108,7 @@ class DofLawKeys(Keys):
     values: Annotated[
         dict[str, float],
         key(f"Its parameters, those that it takes: {takes_in_words()}; {parameters_in_words()}.",
-            absent="required but for `rigid`"),
+            absent="required except for `rigid`"),
     ] = field(default_factory=dict)  # fmt: skip
     mass: Annotated[
         NotNegative | None, key("Mass of the joint in this direction, half of it on either side.", "kg, kg m^2")
@@ -127,7 +127,7 @@ class LawJointKeys(Keys):
 
 
 def read_joint_table(table: TomlTable) -> Joint | LawJoint:
-    """Read a joint from a TOML file: laws where it has tables [[law]], else constants; "at" is left to the caller.
+    """Return the joint in a TOML file: laws if it has tables [[law]], else constants; the caller reads "at".
 
     Raises
     ------
@@ -176,12 +176,12 @@ def _check_law(own: DofLawKeys) -> None:
 
 
 def joint_text(joint: Joint | LawJoint) -> str:
-    """Return a joint as TOML that `read_joint_table` reads, no digit lost.
+    """Return a joint as TOML for `read_joint_table`, with all digits.
 
     Raises
     ------
     ValueError
-        A user-defined law: a file cannot hold a function.
+        A user-defined law: a file cannot contain a function.
     """
     return _text_of_laws(joint) if isinstance(joint, LawJoint) else _text_of_constants(joint)
 
@@ -216,16 +216,16 @@ def _text_of_laws(joint: LawJoint) -> str:
 
 
 def read_law(table: TomlTable, word: str, *, is_cross: bool = False) -> JointLaw:
-    """Read the parameters of a law from a table that holds them alone.
+    """Return a law from a table that contains only its parameters.
 
     Parameters
     ----------
     table : TomlTable
-        Its values are numbers.
+        Table of numbers.
     word : str
-        In `LAW_WORDS`, not "rigid".
+        Name of the law in `LAW_WORDS`, not "rigid".
     is_cross : bool
-        Whether it couples two DOFs, so that a stiffness may be negative.
+        Whether it couples two DOFs, so that a stiffness may be negative; default False.
 
     Raises
     ------
@@ -244,12 +244,12 @@ def read_law(table: TomlTable, word: str, *, is_cross: bool = False) -> JointLaw
     return table.build(lambda: law.from_numbers(numbers, is_cross=is_cross))
 
 
-#: Numbers from which a fit may start anywhere: it finds its own first values.
+#: Numbers for any initial value of a fit, which determines its own.
 _STARTS = {"stiffness": 1e6, "damping": 10.0, "time": 1e-3, "number": 0.5, "frequency": 100.0}
 
 
 def start_values(word: object) -> dict[str, float]:
-    """Return numbers for a law of which none are known, where a fit may start; empty for no such law."""
+    """Return initial values of a law without known numbers; empty if there is no such law."""
     law = _law_of(word) if isinstance(word, str) and word in LAW_WORDS and word != "rigid" else None
     return {} if law is None else {one.name: _STARTS[one.kind] for one in _numbers(law) if one.name != "h"}
 

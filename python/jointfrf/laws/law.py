@@ -19,24 +19,24 @@ __all__ = ["JointLaw", "LawField"]
 #: Kind of a number of a law; it sets the unit.
 FieldKind = Literal["stiffness", "damping", "time", "number", "frequency"]
 
-#: By how much an initial value of a fit stays inside its bounds, as a share of it.
+#: Least distance of an initial value of a fit from its bounds, as a share of the bound.
 _INSIDE = 1e-6
 
 
 class LawField(NamedTuple):
-    """A parameter of a law, or another number that it is made of.
+    """A parameter of a law, or another of its numbers.
 
     Attributes
     ----------
     name : str
-        Such as ``"k"`` or ``"tau"``.
+        Name, such as ``"k"`` or ``"tau"``.
     kind : {"stiffness", "damping", "time", "number"}
-        In K*(w) a stiffness and a damping are factors; a time and a number are not. Also "frequency", of a number that
-        is no parameter of a fit.
+        Kind: stiffnesses and dampings are factors in K*(w), times and numbers are not. Also "frequency" for a number
+        that is no parameter of a fit.
     lower, upper : float
         Smallest and largest value.
     meaning : str
-        A sentence for the reference of files.
+        Description for the reference of files.
     """
 
     name: str
@@ -46,14 +46,14 @@ class LawField(NamedTuple):
     meaning: str = ""
 
     def unit(self, rotations: int) -> str:
-        """Return the unit between two DOFs of which so many (0, 1, 2) are rotations."""
+        """Return the unit between two DOFs of which 0, 1 or 2 are rotations."""
         if rotations not in (0, 1, 2):
             raise ValueError(f"rotations must be 0, 1 or 2, not {one_line(rotations)}")
         return UNITS[self.kind][rotations]
 
     @property
     def is_factor(self) -> bool:
-        """Whether K*(w) is proportional to it where all other factors are zero."""
+        """Whether K*(w) is proportional to it if all other factors are zero."""
         return self.kind in ("stiffness", "damping")
 
 
@@ -67,13 +67,13 @@ class JointLaw(ABC):
     Attributes
     ----------
     word : str
-        Its name in files; empty where files cannot hold it.
+        Name in files; empty if a file cannot contain the law.
     parameters : tuple of LawField
-        The fields of the dataclass that are parameters of a fit.
+        Fields of the dataclass that are parameters of a fit.
     settings : tuple of LawField
-        Further numbers that make it.
+        Further numbers of the law.
     optional : tuple of str
-        Names of those that a file may omit.
+        Names of fields that a file may omit.
     """
 
     word: ClassVar[str] = ""
@@ -92,7 +92,7 @@ class JointLaw(ABC):
 
     @property
     def fields(self) -> tuple[LawField, ...]:
-        """The parameters: names, kinds and bounds."""
+        """Parameters: names, kinds and bounds."""
         return self.parameters
 
     @property
@@ -129,7 +129,7 @@ class JointLaw(ABC):
         return cls(**numbers)
 
     def numbers(self) -> dict[str, float]:
-        """Return what `from_numbers` takes."""
+        """Return the numbers for `from_numbers`."""
         return {field.name: float(getattr(self, field.name)) for field in (*self.fields, *self.settings)}
 
     @abstractmethod
@@ -142,11 +142,11 @@ class JointLaw(ABC):
 
     @property
     def constant_terms(self) -> tuple[float, float, float] | None:
-        """(k, c, h) of K* = k + i h + i w c where the law is that, else None."""
+        """Return (k, c, h) if the law is K* = k + i h + i w c, else None."""
         return None
 
     def trial_numbers(self, omega: FloatArray) -> list[list[float]]:
-        """Values from which a fit may start, a list for each field that is no factor, in their order."""
+        """Return initial values of a fit, a list for each field that is no factor, in their order."""
         low, high = float(omega.min()), float(omega.max())
         choices = []
         for field, value in zip(self.fields, self.values, strict=True):
@@ -164,11 +164,11 @@ class JointLaw(ABC):
         Parameters
         ----------
         omega : ndarray, shape (n_freq,)
-            rad/s.
+            Angular frequencies, rad/s.
         k_lines : ndarray, shape (n_freq,)
-            K*(w) of each line by itself, N/m; NaN does not count.
+            Dynamic stiffness K*(w) of each line by itself, N/m; NaN does not count.
         weight : ndarray, shape (n_freq,), optional
-            1 over the variance of each line; 1 by default.
+            Inverse variance of each line; 1 by default.
 
         Notes
         -----
@@ -198,7 +198,7 @@ class JointLaw(ABC):
         return best
 
     def _unit_factor(self, values: FloatArray, i: int) -> Self:
-        """Return the law with one factor of 1, the others as small as they may be."""
+        """Return the law with one factor of 1, and all further factors as small as possible."""
         own = values.copy()
         for place, field in enumerate(self.fields):
             if field.is_factor:
@@ -214,7 +214,7 @@ def _least_squares(basis: ComplexArray, target: ComplexArray) -> FloatArray:
 
 
 def _within(value: float, field: LawField, size: float) -> float:
-    """Return a value inside the bounds of its field, above zero by a share of a size where zero is a bound."""
+    """Return a value inside the bounds of its field, above zero by a share of a size if zero is a bound."""
     low = field.lower
     if np.isfinite(low):
         low += 1e-3 * size if field.kind == "stiffness" else _INSIDE * abs(low)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Connection", "JointQuantity", "LawJoint", "joined"]
 
-#: The mass of a joint DOF, half of it on either side.
+#: Share of the mass of a joint DOF on either side.
 _MASS = LawField("m", "number", 0.0)
 
 
@@ -43,10 +43,13 @@ class JointQuantity(NamedTuple):
     Attributes
     ----------
     name : str
-        Field and DOF, ``"k_y"``; of a cross term ``"k_y,theta"``; at one of several points ``"bolt1.k_y"``.
+        Field and DOF, ``"k_y"``; for a cross term ``"k_y,theta"``; at one of several points ``"bolt1.k_y"``.
     field : LawField
+        Field of the law.
     unit : str
+        Unit.
     value : float
+        Value.
     """
 
     name: str
@@ -56,15 +59,16 @@ class JointQuantity(NamedTuple):
 
 
 class Connection(NamedTuple):
-    """What connects DOFs of structures, without an inverse: forces f with S f = T u, u = E^T x.
+    """Connection of DOFs of structures, without an inverse: forces f with S f = T u, u = E^T x.
 
     A stiffness has S = 1 and T = K*, a rigid connection S = 0 and T = 1.
 
     Attributes
     ----------
     pattern : ndarray, shape (m, q)
-        E: motions u of the connection from those of the m DOFs; forces on these are -E f.
+        Matrix E: E^T maps motions of the m DOFs to motions u of the connection; forces on the DOFs are -E f.
     s, t : ndarray, shape (n_freq, q, q)
+        Matrices S and T, 1 and N/m.
     """
 
     pattern: FloatArray
@@ -79,21 +83,26 @@ class LawJoint:
     Parameters
     ----------
     laws : mapping of str or (str, str) to JointLaw
-        The law of each DOF that moves; of a pair of DOFs, its symmetric cross term K*_ab.
+        Law of each DOF that moves; for a pair of DOFs, its symmetric cross term K*_ab.
     rigid : sequence of str
-        DOFs that do not move: constraints between both sides, not stiff springs.
+        DOFs that do not move: constraints between both sides, not stiff springs; none by default.
     mass : mapping of str to float
-        Mass of the joint by DOF, kg (rotations kg m^2); half of it moves with either side.
+        Mass of the joint by DOF, kg (rotations kg m^2); half of it moves with either side. None by default.
     dofs : sequence of str, optional
-        Order of the DOFs; by default those of `laws`, then the rigid ones.
+        Order of the DOFs; by default the DOFs of `laws`, then the rigid ones.
     per : mapping of str to {"m", "m^2"}, optional
-        DOFs whose stiffness, damping and mass are per length or area, of a joint along a line or over a face.
+        DOFs with stiffness, damping and mass per length or area, for a joint along a line or over a face.
 
     Raises
     ------
     ValueError
         A DOF with two laws or none, a cross term with a rigid DOF or between a DOF per length and another, a mass that
         is not positive.
+
+    See Also
+    --------
+    Joint : joint of constant matrices.
+    SpringLaw, StandardLinearSolid : laws of a DOF.
 
     Examples
     --------
@@ -128,7 +137,7 @@ class LawJoint:
         by_pair: dict[tuple[str, str], JointLaw] = {}
         for key, law in laws.items():
             if not isinstance(law, JointLaw):
-                raise TypeError(f"laws: that of {key!r} must be a JointLaw, not {type(law).__name__}")
+                raise TypeError(f"laws: the law of {key!r} must be a JointLaw, not {type(law).__name__}")
             by_pair[(key, key) if isinstance(key, str) else key] = law
         moving = [a for a, b in by_pair if a == b]
         names = (*moving, *rigid) if dofs is None else as_names("dofs", dofs)
@@ -162,7 +171,7 @@ class LawJoint:
 
     @classmethod
     def of_joint(cls, joint: Joint) -> LawJoint:
-        """Return a joint of springs and dampers that is the same as one of matrices.
+        """Return a joint of springs and dampers that equals a joint of matrices.
 
         Raises
         ------
@@ -231,7 +240,7 @@ class LawJoint:
         return self.dofs.index(pair[0]), self.dofs.index(pair[1])
 
     def _moving_stiffness(self, omega: FloatArray) -> ComplexArray:
-        """K*(w) with zeros for rigid DOFs, shape (n_freq, n, n)."""
+        """Return K*(w) with zeros for rigid DOFs, shape (n_freq, n, n)."""
         k = np.zeros((omega.size, len(self.dofs), len(self.dofs)), np.complex128)
         for pair, law in self.laws.items():
             a, b = self._place(pair)
@@ -239,7 +248,7 @@ class LawJoint:
         return k
 
     def dynamic_stiffness(self, freq_hz: ArrayLike) -> ComplexArray:
-        """Complex stiffness K*(w), without masses, shape (n_freq, n, n), N/m, rotational N m/rad.
+        """Return the complex stiffness K*(w), without masses, shape (n_freq, n, n), N/m, rotational N m/rad.
 
         Raises
         ------
@@ -251,12 +260,12 @@ class LawJoint:
         return self._moving_stiffness(2 * np.pi * as_frequency(freq_hz))
 
     def compliance(self, freq_hz: ArrayLike, *, on_singular: OnSingular = "raise") -> ComplexArray:
-        """Complex compliance K*^-1(w), zero for rigid DOFs, shape (n_freq, n, n), m/N, rotational rad/(N m).
+        """Return the complex compliance K*^-1(w), zero for rigid DOFs, shape (n_freq, n, n), m/N, rotational rad/(N m).
 
         Raises
         ------
         SingularLineError
-            A line where K* is singular, unless `on_singular` is "nan".
+            A line with singular K*, unless `on_singular` is "nan".
         """
         freq = as_frequency(freq_hz)
         moving = [i for i, dof in enumerate(self.dofs) if dof not in self.rigid]
@@ -267,7 +276,7 @@ class LawJoint:
         return c
 
     def connection(self, omega: FloatArray) -> Connection:
-        """Return how the joint connects its DOFs j of A, then k of B; its masses come last, on j, then on k."""
+        """Return the connection of the joint DOFs j of A, then k of B; its masses come last, on j, then on k."""
         n, masses = len(self.dofs), list(self.mass)
         q = n + 2 * len(masses)
         pattern = np.zeros((2 * n, q))
@@ -286,7 +295,7 @@ class LawJoint:
         return Connection(pattern, s, t)
 
     def connection_slopes(self, omega: FloatArray) -> list[tuple[list[tuple[int, int]], ComplexArray]]:
-        """Return, for each parameter, which entries of T it changes, and its derivative there, shape (n_freq,)."""
+        """Return, for each parameter, the entries of T that it changes, and its derivative there, shape (n_freq,)."""
         found: list[tuple[list[tuple[int, int]], ComplexArray]] = []
         for pair, law in self.laws.items():
             a, b = self._place(pair)
@@ -308,19 +317,19 @@ class LawJoint:
             )
 
     def constant_joint(self, freq_hz: float | None = None) -> Joint:
-        """Return the joint of constant matrices that this is, or is at one frequency.
+        """Return the joint as constant matrices, if necessary at one frequency.
 
         Parameters
         ----------
         freq_hz : float, optional
-            Where laws are taken that depend on frequency: k = Re K*, h = Im K* there.
+            Frequency, Hz, at which laws that depend on frequency are evaluated: k = Re K*, h = Im K*.
 
         Raises
         ------
         ValueError
             A rigid DOF, a mass, or, without `freq_hz`, a law that depends on frequency.
         """
-        self.check_at_points("its constants are those of two points")
+        self.check_at_points("it has the constants of two points")
         if self.rigid or self.mass:
             what = f"{', '.join(self.rigid)} rigid" if self.rigid else f"a mass in {', '.join(self.mass)}"
             raise ValueError(f"a joint with {what} is not one of stiffness and damping alone")
@@ -344,33 +353,38 @@ class LawJoint:
     def export(
         self, program: CardFormat, nodes: Sequence[int], *, freq_hz: float | None = None, **options: Unpack[CardOptions]
     ) -> str:
-        """Write the joint as input of a finite-element program.
+        """Return the joint as input of a finite-element program.
 
         Parameters
         ----------
         program : {"abaqus", "calculix", "nastran", "ansys", "code_aster", "lsdyna", "subdyn"}
+            Name of the program.
         nodes : sequence of two int
             Nodes j on A and k on B.
         freq_hz : float, optional
-            Where laws are taken that depend on frequency, where there are no tables: stiffness and hysteretic damping
-            at that frequency. A comment says so.
+            Frequency, Hz, at which laws that depend on frequency are evaluated, if there are no tables. The result is
+            stiffness and hysteretic damping at this frequency, with a comment.
         element, number, rotation_nodes, damping, full_matrix, positions, points, units, faces, comments, connector
+            Options of the program; see `Joint.export`. A joint with masses takes no `positions`.
         damping_nodes
-            As for `Joint.export`; no `positions` of a joint with masses.
+            First number of the auxiliary nodes of dashpots; see `Joint.export`.
         table_hz : array_like, optional
-            Instead of `freq_hz`: laws as tables over these frequencies, as for `Joint.export`.
+            Frequencies, Hz, of tables of the laws, in place of `freq_hz`; see `Joint.export`.
 
         Returns
         -------
         str
-            Springs and dashpots as by `Joint.export`; rigid DOFs as equations between the nodes, their rotations in
-            CalculiX between the `rotation_nodes`; masses as point masses on both nodes.
+            Lines of input:
+
+            - springs and dashpots as in `Joint.export`
+            - rigid DOFs as equations between the nodes, rotations in CalculiX between the `rotation_nodes`
+            - masses as point masses on both nodes
 
         Raises
         ------
         ValueError
-            What the program cannot represent: a law that depends on frequency without `freq_hz` or `table_hz`;
-            masses that differ by direction, or rotary inertia; what `Joint.export` rejects.
+            The program cannot represent the joint: a law depends on frequency without `freq_hz` or `table_hz`, masses
+            differ by direction, or there is rotary inertia. An error of `Joint.export`.
 
         Examples
         --------
@@ -398,20 +412,20 @@ class LawJoint:
                 if law.constant_terms is None
             ]
         )
-        from jointfrf.io.card_link import COMMENT_MARKS  # readers of files take their time to import
+        from jointfrf.io.card_link import COMMENT_MARKS  # importing readers of files is slow
 
         comment = COMMENT_MARKS.get(program, "")
         if self.mass and options.get("positions") is not None:
             raise ValueError("point masses are written at the nodes; leave positions out")
         note = f"{comment} {', '.join(varying)} at {freq_hz:g} Hz" if varying else ""
-        text = f"{note}: stiffness and hysteretic damping of that frequency hold there only\n" if note else ""
+        text = f"{note}: stiffness and hysteretic damping are valid at this frequency only\n" if note else ""
         number, element = options.get("number", 1), options.get("element", 1)
         if springs is not None:
             cards = _springs(springs, program, nodes, table_hz, options)
             text += cards
-            element += len(cards.splitlines())  # beyond every element that these lines name
+            element += len(cards.splitlines())  # above all elements in these lines
         if self.rigid:
-            from jointfrf.io.cards import rigid_cards  # readers of files take their time to import
+            from jointfrf.io.cards import rigid_cards  # importing readers of files is slow
 
             text += rigid_cards(program, self.rigid, nodes, options, alone=springs is None)
         if self.mass:
@@ -433,14 +447,14 @@ def _springs(
     """Return the cards of springs and dampers, or of laws as tables over frequency."""
     if isinstance(springs, Joint) or table_hz is None:
         return springs.export(program, nodes, **options)
-    from jointfrf.io.cards import table_cards  # readers of files take their time to import
+    from jointfrf.io.cards import table_cards  # importing readers of files is slow
 
     freq = as_real("table_hz", table_hz, (None,))
     return table_cards(program, springs.dofs, freq, springs.dynamic_stiffness(freq), nodes, **options)
 
 
 def joined(joints: Mapping[str, LawJoint]) -> LawJoint:
-    """Return several joints as one, none of which couples DOFs of two: its DOFs are named ``"mount.y"``."""
+    """Return several joints as one without coupling between them; DOFs are named ``"mount.y"``."""
     laws, rigid, mass, dofs, per = {}, list[str](), dict[str, float](), list[str](), dict[str, str]()
     for name, joint in joints.items():
         laws.update({(f"{name}.{a}", f"{name}.{b}"): law for (a, b), law in joint.laws.items()})
@@ -454,15 +468,15 @@ def joined(joints: Mapping[str, LawJoint]) -> LawJoint:
 def _masses(
     program: CardFormat, comment: str, mass: Mapping[str, float], nodes: Sequence[int], numbers: tuple[int, int]
 ) -> str:
-    """Return half of the mass of the joint on either node, alike in all directions."""
+    """Return half of the mass of the joint on either node, equal in all directions."""
     if any(int(place) > 2 for place in direction_places(list(mass))):
         raise ValueError("rotary inertia of a joint cannot be written, as a point mass has none; leave it out")
     values = set(mass.values())
     if len(values) > 1:
-        raise ValueError(f"a point mass is the same in all directions: those of {', '.join(mass)} differ")
+        raise ValueError(f"a point mass is the same in all directions; the masses of {', '.join(mass)} differ")
     if program not in ("abaqus", "calculix", "nastran", "ansys"):
         raise ValueError(f"point masses are not written for {program}; leave the mass out and add it there")
-    from jointfrf.io.card_link import card_integer, card_real  # readers of files take their time to import
+    from jointfrf.io.card_link import card_integer, card_real  # importing readers of files is slow
 
     half = values.pop() / 2
     element, number = numbers

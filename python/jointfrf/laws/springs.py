@@ -26,18 +26,23 @@ class SpringLaw(JointLaw):
     k : float
         Stiffness, N/m (between a displacement and a rotation N, between rotations N m/rad).
     c : float
-        Viscous damping, N s/m.
+        Viscous damping, N s/m, default 0.
     h : float
-        Hysteretic damping, loss factor times stiffness, N/m.
+        Hysteretic damping, loss factor times stiffness, N/m, default 0.
     damping : {"none", "viscous", "hysteretic", "both"}, optional
-        Which dampings are parameters; by default those that are not zero, and viscous where both are.
+        Damping terms that are parameters; by default those that are not zero, and viscous damping if both are zero.
     is_cross : bool
-        Whether it couples two DOFs: k may then be negative.
+        Whether it couples two DOFs, so that k may be negative; default False.
 
     Raises
     ------
     ValueError
-        A negative stiffness of one DOF, damping that `damping` leaves out, NaN or Inf.
+        A negative stiffness of one DOF, damping that `damping` omits, NaN or Inf.
+
+    See Also
+    --------
+    LawJoint : joint of laws.
+    StandardLinearSolid, FractionalZener, PowerLaw : laws that depend on frequency.
 
     Examples
     --------
@@ -74,13 +79,13 @@ class SpringLaw(JointLaw):
 
     @property
     def fields(self) -> tuple[LawField, ...]:
-        """k, then h, then c, as far as they are parameters."""
+        """Parameters among k, h and c, in this order."""
         assert self.damping is not None
         return _fields(self.damping, self.is_cross)
 
     @classmethod
     def from_numbers(cls, numbers: Mapping[str, Any], *, is_cross: bool) -> Self:
-        """Return the spring that a file describes, with the damping that it names; `is_cross`: it couples two DOFs."""
+        """Return the spring of a file, with the damping that it names; `is_cross`: it couples two DOFs."""
         named: dict[tuple[bool, bool], SpringDamping] = {(True, True): "both", (True, False): "hysteretic"}
         damping = named.get(("h" in numbers, "c" in numbers), "viscous")
         return cls(**numbers, damping=damping, is_cross=is_cross)
@@ -96,7 +101,7 @@ class SpringLaw(JointLaw):
 
     @property
     def constant_terms(self) -> tuple[float, float, float] | None:
-        """(k, c, h)."""
+        """Return (k, c, h)."""
         return self.k, self.c, self.h
 
 

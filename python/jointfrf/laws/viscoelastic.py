@@ -11,24 +11,24 @@ from jointfrf.laws.law import JointLaw, LawField
 
 __all__ = ["FractionalZener", "PowerLaw", "StandardLinearSolid"]
 
-#: Smallest exponent and time: below, K*(w) would not depend on the other parameters; frequencies are only positive.
+#: Smallest exponent and time: below, K*(w) would not depend on all further parameters; frequencies are only positive.
 _LEAST_ALPHA, _LEAST_TIME, _LEAST_HZ = 1e-3, 1e-12, TINY
 #: Numbers of several laws.
 _K = LawField("k", "stiffness", 0.0, meaning="Stiffness, at rest.")
-#: The number that both fractional laws have.
+#: The exponent of both fractional laws.
 _ALPHA = LawField("alpha", "number", _LEAST_ALPHA, 1.0, meaning="Order of the derivative.")
 
 
 @dataclass(frozen=True)
 class StandardLinearSolid(JointLaw):
-    """Spring beside a spring and a dashpot in series, K*(w) = k + k_m i w tau / (1 + i w tau).
+    """Spring parallel to a spring and a dashpot in series, K*(w) = k + k_m i w tau / (1 + i w tau).
 
     Parameters
     ----------
     k : float
         Stiffness at rest, N/m, N m/rad.
     k_m : float
-        What is added at high frequencies, N/m, N m/rad.
+        Additional stiffness at high frequencies, N/m, N m/rad.
     tau : float
         Relaxation time, s: losses are largest near w = 1/tau.
 
@@ -36,6 +36,11 @@ class StandardLinearSolid(JointLaw):
     ------
     ValueError
         A value that is negative, NaN or Inf.
+
+    See Also
+    --------
+    FractionalZener : the same with a fractional derivative.
+    LawJoint : joint of laws.
 
     Examples
     --------
@@ -51,7 +56,7 @@ class StandardLinearSolid(JointLaw):
     word = "standard-linear-solid"
     parameters = (
         _K,
-        LawField("k_m", "stiffness", 0.0, meaning="What is added at high frequencies."),
+        LawField("k_m", "stiffness", 0.0, meaning="Additional stiffness at high frequencies."),
         LawField("tau", "time", _LEAST_TIME, meaning="Relaxation time."),
     )
 
@@ -75,7 +80,7 @@ class FractionalZener(JointLaw):
     k : float
         Stiffness at rest, N/m, N m/rad.
     k_m : float
-        What is added at high frequencies, N/m, N m/rad.
+        Additional stiffness at high frequencies, N/m, N m/rad.
     tau : float
         Relaxation time, s.
     alpha : float
@@ -126,7 +131,7 @@ class FractionalZener(JointLaw):
 
 @dataclass(frozen=True)
 class PowerLaw(JointLaw):
-    """Spring beside a spring-pot, K*(w) = k + k_a (i w / w_0)^alpha, w_0 = 2 pi reference_hz.
+    """Spring parallel to a spring-pot, K*(w) = k + k_a (i w / w_0)^alpha, w_0 = 2 pi reference_hz.
 
     Parameters
     ----------
@@ -136,7 +141,7 @@ class PowerLaw(JointLaw):
     k_a : float
         Modulus of the spring-pot at the reference frequency, N/m, N m/rad.
     alpha : float
-        0 to 1: from a spring to a dashpot.
+        Exponent, 0 to 1: from a spring to a dashpot.
     reference_hz : float
         Reference frequency, Hz; no parameter of a fit.
 

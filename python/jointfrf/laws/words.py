@@ -1,4 +1,4 @@
-"""The laws that files can hold, by their words; none is imported to know its word."""
+"""Laws of files by their names; they are imported only on use."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 __all__ = ["LAWS", "LAW_WORDS", "law_of_plugin"]
 
-#: Module of this package and class by word: a new law is a file with its class, and its line here.
+#: Module of this package and class by name: a new law is a file with its class, and its line here.
 LAWS = {
     "spring": ("springs", "SpringLaw"),
     "standard-linear-solid": ("viscoelastic", "StandardLinearSolid"),
@@ -26,7 +26,7 @@ def law_of_plugin(word: object) -> EntryPoint | None:
 
 
 class _LawWords(tuple[str, ...]):
-    """Words of our own laws; those of plugins are found in it, too."""
+    """Words of our own laws; plugins add further ones."""
 
     __slots__ = ()
 

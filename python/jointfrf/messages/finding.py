@@ -1,4 +1,4 @@
-"""A finding: what was noticed in data or in a fit, as data; its sentence comes from the table of messages."""
+"""A finding: a fact about data or a fit, as data; its sentence comes from the table of messages."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["MESSAGES", "Finding", "WithFindings", "as_warning", "messages_of", "
 #: Every message by its code, in the order of the reference page.
 MESSAGES: Mapping[str, Message] = {**DATA_MESSAGES, **FIT_MESSAGES}
 
-#: Warnings that put the whole fit in doubt, the worst first; then the warnings about single numbers.
+#: Warnings that put the whole fit in doubt, the worst first; warnings about single numbers follow.
 _WORST = (
     "amplitude-dependent", "amplitude-not-smooth", "channel-changed", "channel-change-ambiguous",
     "channel-inconsistent", "not-converged",
@@ -45,9 +45,9 @@ class Finding:
     bands : tuple of (low, high)
         Parts of the band concerned, Hz.
     severity : {"error", "warning", "note"}
-        A fit is meaningless; some numbers are in doubt; for information.
+        Severity: "error" if the fit is meaningless, "warning" if some numbers are in doubt, "note" for information.
     variant : str
-        Which template of the code the sentence has.
+        Name of the template of the code.
     test : str
         Name of the test concerned, if there are several.
 
@@ -89,7 +89,7 @@ with less noise [stiffness-zero]
         return f"{self.severity}: {self.message}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it for JSON; a number that is not finite becomes None."""
+        """Return the finding for JSON; a number that is not finite becomes None."""
         return {
             "code": self.code,
             "severity": self.severity,
@@ -103,7 +103,7 @@ with less noise [stiffness-zero]
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as JSON has it."""
+    """Return a value for JSON."""
     if isinstance(value, list | tuple):
         return [_plain(each) for each in value]
     if hasattr(value, "item"):  # a number of numpy
@@ -114,8 +114,8 @@ def _plain(value: Any) -> Any:
 def saved_finding(content: Mapping[str, Any], read_text: Callable[[Any], str] = visible) -> Finding:
     """Return a finding of a file, as `Finding.to_dict` or version 0.2 wrote it.
 
-    A text that the numbers do not give is kept as it is: of version 0.2, of a code of a later version, and with numbers
-    that are not finite, which JSON does not contain.
+    A text that does not follow from the numbers is kept unchanged: of version 0.2, of a code of a later version, and
+    with numbers that are not finite, which JSON does not contain.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def _value(value: Any, read_text: Callable[[Any], str]) -> Any:
 
 
 class WithFindings:
-    """Something with findings, which it gives as sentences, too."""
+    """An object with findings, and their sentences."""
 
     findings: tuple[Finding, ...]
 
@@ -161,7 +161,7 @@ class WithFindings:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """How the numbers were found."""
+        """Origin of the numbers."""
         return tuple(one.message for one in self.findings if one.severity == "note")
 
     def content(self) -> dict[str, list[dict[str, Any]]]:
@@ -170,7 +170,7 @@ class WithFindings:
 
 
 def messages_of(findings: Iterable[Finding], test: str = "") -> tuple[str, ...]:
-    """Return errors and warnings as they are printed, of a test of this name."""
+    """Return errors and warnings as printed, for a test of this name."""
     found = (one for one in findings if one.severity != "note")
     return tuple((replace(one, test=test) if test else one).message for one in found)
 

@@ -14,7 +14,7 @@ __all__ = ["Message", "Severity", "Templates"]
 Severity = Literal["error", "warning", "note"]
 #: One template, or one for each variant; the variant "" is used for the variants that are not listed.
 Templates = str | Mapping[str, str]
-#: Names shown of a list.
+#: Number of names of a list in a message.
 _SHOWN = 4
 
 
@@ -25,13 +25,14 @@ class Message:
     Attributes
     ----------
     severity : {"error", "warning", "note"}
-        A fit is meaningless; some numbers are in doubt; for information. A finding may have another one.
+        Severity: "error" if the fit is meaningless, "warning" if some numbers are in doubt, "note" for information.
+        A finding may have another one.
     text : str or mapping of str to str
         Template of the sentence that states the fact, with the names of numbers in braces.
     remedy : str or mapping of str to str
-        Template of the sentence that states what to do; empty for a note that needs nothing.
+        Template of the sentence that states the remedy; empty for a note that needs none.
     means, why, do : str
-        The paragraph of the reference page: what the message means, why it happens, what to do.
+        Paragraph of the reference page: meaning, cause and remedy.
     """
 
     severity: Severity
@@ -63,7 +64,7 @@ class Message:
 
 
 class _Words(Formatter):
-    """Formats as `str.format` does, lists of names with commas, and with `p` for the type a share in percent."""
+    """Formatter like `str.format`, with lists of names separated by commas, and type `p` for a share in percent."""
 
     def format_field(self, value: Any, format_spec: str) -> str:
         if isinstance(value, str):

@@ -1,4 +1,4 @@
-"""The messages of the data checks: what may be wrong with measured FRFs, from simple causes to rare ones."""
+"""Messages of the data checks: possible errors of measured FRFs, from simple causes to rare ones."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from jointfrf.messages.message import Message
 
 __all__ = ["DATA_MESSAGES", "FATAL_CODES"]
 
-#: Errors with which no fit is meaningful: `identify` stops, unless they are accepted.
+#: Errors with which every fit is meaningless: `identify` stops, unless they are accepted.
 FATAL_CODES: Final = (
     "quantity", "driving-point-sign", "gyroscopic", "time-convention", "phase-unit", "unsigned-phase", "decibel",
 )  # fmt: skip
 
-#: How far a channel is from the rigid motion of its neighbours.
+#: Deviation of a channel from the rigid motion of its neighbours.
 _DIFFERS = "it differs by {error:.3p} from the rigid motion of {neighbours} neighbours, which agree to {rest:.2p}"
 _DIFFER = "they differ by {error:.3p} from the rigid motion of {neighbours} neighbours, which agree to {rest:.2p}"
 _UNDECIDED = "; {others} may be wrong instead, because as many channels agree with each side"
@@ -157,7 +157,7 @@ DATA_MESSAGES: Final[Mapping[str, Message]] = {
         },
         {"": "Measure one of them again", "moves-alike": "Check cable and place of {second}, and measure it again"},
         means="Two channels are one measurement. Two DOFs need two measurements.",
-        why="One column was exported twice, a cable was connected to another sensor, or an impact hit another point.",
+        why="One column was exported twice, a cable was connected to another sensor, or an impact was elsewhere.",
         do="Measure the second channel again, or leave it out.",
     ),
     "exchanged-channels": Message(

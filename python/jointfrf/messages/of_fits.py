@@ -1,4 +1,4 @@
-"""The messages of fits, and of levels, pools and plans."""
+"""Messages of fits, and of levels, pools and plans."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ __all__ = ["BeamElement", "End", "beam", "check_ends"]
 BeamElement = Literal["euler-bernoulli", "shear-flexible"]
 End = Literal["free", "clamped"]
 
-#: Shear coefficient of a rectangular section, as Abaqus takes it.
+#: Shear coefficient of a rectangular section in Abaqus.
 _SHEAR_COEFFICIENT = 0.85
 #: Abaqus' slenderness compensation: keeps the shear stiffness of long elements from locking.
 _SLENDERNESS_COMPENSATION = 0.25
@@ -37,42 +37,48 @@ def beam(
     loss_factor: float = 0.0,
     viscous: tuple[float, float] = (0.0, 0.0),
 ) -> Model:
-    """Straight uniform beam of rectangular section along x, bending in y.
+    """Return a straight uniform beam of rectangular section along x, bending in y.
 
     Parameters
     ----------
     length : float
-        m.
+        Length, m.
     n_elements : int
         Number of equal elements.
     youngs_modulus, density : float
-        N/m^2, kg/m^3.
+        Young's modulus, N/m^2, and density, kg/m^3.
     width, height : float
-        Section, m; it bends about its width.
+        Width and height of the section, m; it bends about its width.
     ends : tuple of {"free", "clamped"}
-        First and last node. The DOFs of a clamped node are left out.
+        Boundary conditions of the first and last node, default free. The DOFs of a clamped node are omitted.
     element : {"euler-bernoulli", "shear-flexible"}
-        Cubic element with consistent mass; or linear element with shear, one integration point and lumped mass, like
-        Abaqus' B21.
+        Element type: cubic with consistent mass (default); or linear with shear, one integration point and lumped mass,
+        like Abaqus' B21.
     axial : bool
-        Whether a node also moves along x.
+        Whether a node also moves along x, default False.
     poisson : float
         Poisson's ratio, for the shear modulus of the shear-flexible element.
     loss_factor : float
-        Structural damping, K (1 + i eta).
+        Loss factor eta of structural damping, K (1 + i eta), default 0.
     viscous : tuple of float
-        (a, b) of viscous damping C = a M + b K, 1/s and s.
+        Coefficients (a, b) of viscous damping C = a M + b K, 1/s and s, default 0.
 
     Returns
     -------
     Model
-        Banded matrices. DOFs ``"node:y"``, ``"node:theta"`` (and ``"node:x"`` first), nodes counted from 1 at x = 0,
-        the clamped ones included.
+        Beam with banded matrices. DOFs ``"node:y"``, ``"node:theta"`` (and ``"node:x"`` first); nodes are counted from
+        1 at x = 0, including clamped ones.
 
     Raises
     ------
     ValueError
         A dimension that is not positive, or an unknown option.
+
+    See Also
+    --------
+    plate : rectangular plates.
+    chain : chains of masses and springs.
+    with_modal_damping : a model with damping ratios of its modes.
 
     Examples
     --------
@@ -129,7 +135,7 @@ def beam(
 
 
 def check_ends(ends: object) -> None:
-    """Raise unless these are two words for the ends of a beam."""
+    """Raise an error unless these are two words for the ends of a beam."""
     if not isinstance(ends, tuple | list) or len(ends) != 2:
         raise ValueError(f"ends must be two of {', '.join(get_args(End))}, not {reprlib.repr(ends)}")
     for end in ends:
@@ -137,7 +143,7 @@ def check_ends(ends: object) -> None:
 
 
 def _euler_bernoulli(step: float, bending: float, line_mass: float) -> tuple[FloatArray, FloatArray]:
-    """Stiffness and consistent mass of the cubic element, DOFs y1, theta1, y2, theta2."""
+    """Return stiffness and consistent mass of the cubic element, DOFs y1, theta1, y2, theta2."""
     a = step
     k = np.array(
         [
@@ -161,7 +167,7 @@ def _euler_bernoulli(step: float, bending: float, line_mass: float) -> tuple[Flo
 def _shear_flexible(
     step: float, bending: float, shear: float, line_mass: float, rotary_mass: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Stiffness and lumped mass of the linear element, integrated at its middle."""
+    """Return stiffness and lumped mass of the linear element, integrated at its middle."""
     curvature = np.array([0, -1, 0, 1]) / step
     angle = np.array([-1 / step, -0.5, 1 / step, -0.5])
     k = step * (bending * np.outer(curvature, curvature) + shear * np.outer(angle, angle))
@@ -169,7 +175,7 @@ def _shear_flexible(
 
 
 def _with_axial(bending: FloatArray, axial: FloatArray) -> FloatArray:
-    """Element matrix with the axial DOF first at each node."""
+    """Return an element matrix with the axial DOF first at each node."""
     whole = np.zeros((6, 6))
     whole[np.ix_([1, 2, 4, 5], [1, 2, 4, 5])] = bending
     whole[np.ix_([0, 3], [0, 3])] = axial
@@ -177,7 +183,7 @@ def _with_axial(bending: FloatArray, axial: FloatArray) -> FloatArray:
 
 
 def _assembled(element: FloatArray, count: int, per_node: int, first: int, last: int) -> sparse.dia_array:
-    """Sum of equal elements along the beam, stored by diagonals; DOFs first to last - 1 are kept."""
+    """Return the sum of equal elements along the beam by diagonals; DOFs first to last - 1 are kept."""
     size = 2 * per_node
     total = per_node * (count + 1)
     diagonals = np.zeros((2 * size - 1, total))

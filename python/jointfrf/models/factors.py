@@ -1,4 +1,4 @@
-"""Factors of matrices: the only interface to SuperLU, PARDISO, MUMPS and METIS, and to LAPACK for those of few DOFs."""
+"""Factors of matrices: the only interface to SuperLU, PARDISO, MUMPS and METIS, and to LAPACK for few DOFs."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ SYMMETRIC: Final[dict[str, Any]] = {
     "diag_pivot_thresh": 0.01,
     "options": {"SymmetricMode": True},
 }
-#: From this many DOFs on an order by dissection has smaller factors than one by minimum degree.
+#: Number of DOFs from which on an order by dissection has smaller factors than one by minimum degree.
 _DISSECTED: Final = 4_000
-#: From this many DOFs on another library, where it is installed, is faster including its start-up.
+#: Number of DOFs from which on another library, if installed, is faster including its start-up.
 _LARGE: Final = 20_000
-#: Parts of this many vertices are not cut any more.
+#: Number of vertices below which a part is not cut.
 _SMALL: Final = 64
-#: A cut leaves at least this share of the vertices on either side.
+#: Least share of the vertices on either side of a cut.
 _SHARE: Final = 0.3
 Vertices = NDArray[np.intp]
 
@@ -50,8 +50,9 @@ class Factors:
     Parameters
     ----------
     solver : callable
-        Right-hand sides of the matrix's own type, shape (n, k), and "N" or "H", to solutions.
+        Function of right-hand sides of the matrix's type, shape (n, k), and "N" or "H"; returns solutions.
     is_complex : bool
+        Whether the matrix is complex.
     name : str
         Library and order of elimination.
     """
@@ -61,7 +62,7 @@ class Factors:
     name: str
 
     def solve(self, b: Array, trans: Literal["N", "H"] = "N") -> Array:
-        """Solve A x = b, or A^H x = b; shape (n,) or (n, k), complex right-hand sides of a real matrix, too."""
+        """Return x of A x = b, or A^H x = b; shape (n,) or (n, k); right-hand sides of a real matrix may be complex."""
         columns = b.reshape(b.shape[0], -1)
         if self.is_complex or not np.iscomplexobj(b):
             found = self.solver(columns.astype(np.complex128 if self.is_complex else np.float64), trans)
@@ -72,13 +73,13 @@ class Factors:
 
 
 class SparseSolver:
-    """Factors matrices of one pattern, whose order of elimination is found once.
+    """Factors matrices of one pattern, whose order of elimination is computed once.
 
     Parameters
     ----------
     library : {"SuperLU", "PARDISO", "MUMPS"}, optional
-        By default the fastest one installed that is able: for symmetric matrices of 20 000 DOFs or more PARDISO
-        (package pypardiso; real ones only) or MUMPS (package python-mumps), else SuperLU.
+        Library; by default the fastest suitable one. For symmetric matrices of 20 000 DOFs or more this is PARDISO
+        (package pypardiso; real ones only) or MUMPS (package python-mumps) if installed, else SuperLU.
     """
 
     def __init__(self, library: Library | None = None) -> None:
@@ -88,14 +89,14 @@ class SparseSolver:
         self._order: tuple[NDArray[np.intp], str] | None = None
 
     def factor(self, matrix: Any, is_symmetric: bool = True) -> Factors:
-        """Factor a matrix.
+        """Return the factors of a matrix.
 
         Parameters
         ----------
         matrix : sparse array, shape (n, n)
-            Real or complex; of the pattern of those before.
+            Real or complex matrix with the pattern of the earlier ones.
         is_symmetric : bool
-            A = A^T; PARDISO and MUMPS, which take one triangle, are used for nothing else.
+            Whether A = A^T; PARDISO and MUMPS take one triangle and are used for symmetric matrices only.
 
         Raises
         ------
@@ -107,7 +108,7 @@ class SparseSolver:
         return factors
 
     def _by_library(self, matrix: Any, is_symmetric: bool) -> Factors | None:
-        """Factor by another library, if there is one that can."""
+        """Return factors by another library, if one is suitable."""
         for library in self._choices(matrix, is_symmetric):
             try:
                 return _MAKERS[library](matrix)
@@ -117,14 +118,14 @@ class SparseSolver:
         return None
 
     def _choices(self, matrix: Any, is_symmetric: bool) -> list[Library]:
-        """Libraries to try before SuperLU, best first."""
+        """Return the libraries to try before SuperLU, best first."""
         able: list[Library] = ["MUMPS"] if np.iscomplexobj(matrix) else ["PARDISO", "MUMPS"]
         if not is_symmetric or (self.library is None and matrix.shape[0] < _LARGE):
             return []
         return able if self.library is None else [name for name in able if name == self.library]
 
     def _by_superlu(self, matrix: Any) -> Factors:
-        """Factor by SuperLU, large matrices in an order by dissection."""
+        """Return factors by SuperLU; large matrices are ordered by dissection."""
         if matrix.shape[0] < _DISSECTED:
             own = _superlu(sparse.csc_matrix(matrix), **SYMMETRIC)
             return Factors(lambda b, trans: own.solve(b, trans=trans), np.iscomplexobj(matrix), "SuperLU")
@@ -145,7 +146,7 @@ class SparseSolver:
 
 
 def factor(matrix: Any, is_symmetric: bool = True) -> Factors:
-    """Factor one matrix: a real array by LAPACK, a sparse one as `SparseSolver.factor` does."""
+    """Return the factors of one matrix: a real array by LAPACK, a sparse one like `SparseSolver.factor`."""
     return _by_lapack(matrix) if isinstance(matrix, np.ndarray) else SparseSolver().factor(matrix, is_symmetric)
 
 
@@ -161,7 +162,7 @@ def _superlu(matrix: sparse.csc_matrix, **options: Any) -> sparse_linalg.SuperLU
 
 
 def _by_lapack(matrix: FloatArray) -> Factors:
-    """Factor a real array."""
+    """Return the factors of a real array."""
     lu, pivots, info = lapack.dgetrf(matrix)
     if info > 0:
         raise SingularMatrixError("a pivot is zero")
@@ -178,7 +179,7 @@ def _imported(module: str) -> Any:
         return import_extra(module)
     except MissingPackageError:
         raise
-    except ImportError as error:  # a library that it is linked with is not found
+    except ImportError as error:  # a library to which it is linked is missing
         raise _NotFactoredError(str(error)) from error
 
 
@@ -189,7 +190,7 @@ def _upper_half(matrix: Any) -> sparse.csr_matrix:
 
 
 def _by_pardiso(matrix: Any) -> Factors:
-    """Factor half of a real symmetric matrix by PARDISO of MKL."""
+    """Return the factors of half of a real symmetric matrix by PARDISO of MKL."""
     wrapper = _imported("pypardiso").pardiso_wrapper
     half = _upper_half(matrix)
     try:
@@ -202,12 +203,12 @@ def _by_pardiso(matrix: Any) -> Factors:
         found: Array = solver.solve(half, b)
         return found
 
-    weakref.finalize(solve, solver.free_memory, everything=True)  # what the library holds
+    weakref.finalize(solve, solver.free_memory, everything=True)  # memory of the library
     return Factors(solve, False, "PARDISO")
 
 
 def _by_mumps(matrix: Any) -> Factors:
-    """Factor half of a symmetric matrix, real or complex, by MUMPS."""
+    """Return the factors of half of a symmetric matrix, real or complex, by MUMPS."""
     mumps = _imported("mumps")
     context = mumps.Context()
     try:
@@ -229,20 +230,20 @@ _MAKERS: Final[dict[Library, Callable[[Any], Factors]]] = {"PARDISO": _by_pardis
 
 
 def elimination_order(matrix: sparse.sparray | sparse.spmatrix) -> tuple[Vertices, str]:
-    """Order the DOFs of a matrix by nested dissection of its graph.
+    """Return the order of the DOFs of a matrix by nested dissection of its graph.
 
     Parameters
     ----------
     matrix : sparse array, shape (n, n)
-        Only which entries are there counts.
+        Matrix, of which only the pattern of entries counts.
 
     Returns
     -------
     order : ndarray of int, shape (n,)
-        ``matrix[order][:, order]`` has factors of few entries.
+        Order in which ``matrix[order][:, order]`` has factors of few entries.
     name : {"METIS", "nested dissection"}
-        METIS where the package pymetis is installed; else cuts through levels of a breadth-first search, whose factors
-        hold about twice as many entries.
+        Method: METIS if the package pymetis is installed; else cuts through levels of a breadth-first search, whose
+        factors have about twice as many entries.
 
     References
     ----------
@@ -255,7 +256,7 @@ def elimination_order(matrix: sparse.sparray | sparse.spmatrix) -> tuple[Vertice
         metis = import_extra("pymetis")
     except MissingPackageError:
         metis = None
-    if metis is None or not graph.shape[0]:  # METIS fails on a graph of nothing
+    if metis is None or not graph.shape[0]:  # METIS fails on an empty graph
         return _dissected(graph), "nested dissection"
     order, _ = metis.nested_dissection(metis.CSRAdjacency(graph.indptr, graph.indices))
     return np.asarray(order, np.intp), "METIS"
@@ -274,7 +275,7 @@ def _graph(matrix: sparse.sparray | sparse.spmatrix) -> sparse.csr_array:
 
 
 def _dissected(graph: sparse.csr_array) -> Vertices:
-    """Cut the graph again and again; of each cut both sides come first, and then what separates them."""
+    """Return an order by repeated cuts of the graph: both sides of a cut first, then the separator."""
     order = np.empty(graph.shape[0], np.intp)
     pending = [(np.arange(graph.shape[0]), 0)] if graph.shape[0] else []
     while pending:
@@ -291,10 +292,10 @@ def _dissected(graph: sparse.csr_array) -> Vertices:
 
 
 def _cut(part: sparse.csr_array) -> tuple[Vertices, Vertices, Vertices] | None:
-    """Return two sides and what separates them: a small level of distances from a far end; None if there is none."""
+    """Return two sides and their separator: a small level of distances from a far end; None if there is none."""
     distance = _distances(part, 0)
     near = np.isfinite(distance)
-    if not near.all():  # not connected: nothing separates the parts
+    if not near.all():  # not connected: no separator is needed
         return np.flatnonzero(near), np.flatnonzero(~near), np.zeros(0, np.intp)
     for _ in range(2):
         distance = _distances(part, int(distance.argmax()))
@@ -308,7 +309,7 @@ def _cut(part: sparse.csr_array) -> tuple[Vertices, Vertices, Vertices] | None:
     if not levels.size:
         return None
     level = levels[sizes[levels].argmin()]
-    # of the level only what touches the far side separates
+    # only the vertices of the level that touch the far side separate
     touching = np.zeros(part.shape[0], bool)
     touching[part[distance > level].indices] = True
     between = (distance == level) & touching
@@ -316,5 +317,5 @@ def _cut(part: sparse.csr_array) -> tuple[Vertices, Vertices, Vertices] | None:
 
 
 def _distances(part: sparse.csr_array, start: int) -> NDArray[np.float64]:
-    """Return the number of edges from one vertex to each; inf where there is no way."""
+    """Return the number of edges from one vertex to each; inf if there is no path."""
     return np.asarray(csgraph.dijkstra(part, unweighted=True, indices=start))

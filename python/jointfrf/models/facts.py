@@ -1,4 +1,4 @@
-"""What shows that matrices are the right ones: mass, definiteness, rigid-body motions, natural frequencies."""
+"""Checks of matrices: mass, definiteness, rigid-body motions, natural frequencies."""
 
 from __future__ import annotations
 
@@ -17,38 +17,39 @@ from jointfrf.models.points import PointModel
 
 __all__ = ["ModelFacts", "model_facts"]
 
-#: A rigid motion is free where its energy is below this share of that of its entries: files hold 7 digits at least.
+#: Energy of a rigid motion, relative to the energy of its entries, below which it is free: files have 7 digits or more.
 _FREE = 1e-6
-#: Masses along x, y and z differ by more than this share where a direction of nodes is held or turned.
+#: Relative difference of masses along x, y and z above which a direction of nodes is fixed or rotated.
 _SAME = 1e-3
-#: Up to this many DOFs natural frequencies are computed: a second.
+#: Number of DOFs up to which natural frequencies are computed: a second.
 _FEW = 20_000
-#: Frequencies shown.
+#: Number of frequencies printed.
 _SHOWN = 10
-#: Rigid motions come out within this share of the shift about zero.
+#: Share of the shift about zero within which rigid motions are found.
 _ROUNDING = 1e-3
-#: An eigenvalue below minus this share of the largest of those computed is negative, not rounding.
+#: Relative size, over the largest computed eigenvalue, above which a negative eigenvalue is not rounding.
 _NEGATIVE = 1e-6
 
 
 @dataclass(frozen=True)
 class ModelFacts:
-    """What is known of a model by its matrices.
+    """Properties of a model that follow from its matrices.
 
     Attributes
     ----------
     n_dofs, n_nodes, n_inner : int
-        DOFs; nodes; DOFs of no node: modal coordinates, inner DOFs of elements, directions of their own.
+        Numbers of DOFs, of nodes, and of DOFs without a node: modal coordinates, inner DOFs of elements, local
+        directions.
     mass : ndarray, shape (3,)
-        That takes part in motions along x, y, z, kg; of a held structure without what is held.
+        Mass that takes part in motions along x, y, z, kg; without fixed DOFs.
     centre : ndarray, shape (3,), or None
-        Centre of gravity, m; None where places of nodes are not known.
+        Centre of gravity, m; None if places of nodes are not known.
     rigid_motions : int
-        How many motions as a rigid body are free of stiffness.
+        Number of rigid-body motions without stiffness.
     natural_frequencies : ndarray
-        The lowest ones above the rigid motions, Hz; none of large models.
+        Lowest frequencies above the rigid motions, Hz; none for large models.
     findings : tuple of str
-        What looks wrong; one sentence each.
+        Possible errors, one sentence each.
     """
 
     n_dofs: int
@@ -61,7 +62,7 @@ class ModelFacts:
     findings: tuple[str, ...]
 
     def lines(self) -> list[str]:
-        """Say it, line by line."""
+        """Return the properties as lines of text."""
         same = np.ptp(self.mass) <= _SAME * self.mass.max(initial=0)
         mass = f"{self.mass.max():.5g} kg" if same else ", ".join(f"{m:.5g}" for m in self.mass) + " kg along x, y, z"
         inner = f" ({self.n_inner} of no node)" if self.n_inner else ""
@@ -76,12 +77,12 @@ class ModelFacts:
 
 
 def model_facts(model: Model) -> ModelFacts:
-    """Look at the matrices of a model.
+    """Return the properties of a model that follow from its matrices.
 
     Parameters
     ----------
     model : Model
-        With symmetric K and M; the places of a `PointModel` give the centre of gravity and rotations.
+        Model with symmetric K and M; the places of a `PointModel` give the centre of gravity and rotations.
 
     Examples
     --------
@@ -110,7 +111,7 @@ def model_facts(model: Model) -> ModelFacts:
 def _rigid_motions(dofs: tuple[str, ...], places: Mapping[str, FloatArray]) -> tuple[FloatArray, int, int]:
     """Return motions of the DOFs for unit rigid motions about the origin, shape (n, 6); numbers of nodes and others.
 
-    Where places of nodes are known, DOFs of what has none are inner ones, as of incompatible modes, which do not move.
+    If places of nodes are known, DOFs without a place are inner ones, as of incompatible modes, which do not move.
     """
     motion = np.zeros((len(dofs), 6))
     of_node: dict[str, FloatArray] = {}
@@ -143,7 +144,7 @@ def _centre(inertia: FloatArray) -> FloatArray | None:
 
 
 def _free_motions(k: sparse.csr_array, motion: FloatArray) -> int:
-    """Return how many combinations of rigid motions have no strain energy but for rounding."""
+    """Return the number of combinations of rigid motions without strain energy, except for rounding."""
     if not motion.shape[1]:
         return 0
     size = abs(motion).T @ (abs(k) @ abs(motion))
@@ -186,12 +187,12 @@ def _findings(k: sparse.csr_array, m: sparse.csr_array, mass: FloatArray, negati
     if mass.max(initial=0) <= 0:
         found.append("no mass takes part in a motion along x, y or z")
     elif np.ptp(mass[mass > 0]) > _SAME * mass.max():
-        found.append("masses along x, y and z differ: directions of nodes are held, or turned from the basic axes")
+        found.append("masses along x, y and z differ: directions of nodes are fixed, or turned from the basic axes")
     return found
 
 
 def _lowest(m: sparse.csr_array) -> float:
-    """Return about the smallest eigenvalue of the mass matrix."""
+    """Return an estimate of the smallest eigenvalue of the mass matrix."""
     if m.shape[0] <= 64:
         return float(np.linalg.eigvalsh(m.toarray())[0])
     try:
@@ -199,4 +200,4 @@ def _lowest(m: sparse.csr_array) -> float:
             sparse_linalg.eigsh(m, 1, which="SA", v0=np.ones(m.shape[0]), tol=1e-2, return_eigenvectors=False)[0]
         )
     except sparse_linalg.ArpackNoConvergence:
-        return 0.0  # the diagonal is looked at all the same
+        return 0.0  # the diagonal is checked separately

@@ -1,4 +1,4 @@
-"""Rational Krylov reduction of a model with one loss factor or proportional damping, and how its error is estimated."""
+"""Rational Krylov reduction of a model with one loss factor or proportional damping, with an error estimate."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.kernel.call import RCOND_LIMIT
 from jointfrf.models.factors import Factors, SingularMatrixError, SparseSolver
 from jointfrf.models.matrices import ModelMatrices, Ports, directions
-from jointfrf.models.modal import Modes, RigidModes, find_rigid_modes, held
+from jointfrf.models.modal import Modes, RigidModes, find_rigid_modes, no_rigid_modes
 
 __all__ = ["reduce_model", "spot_error"]
 
-#: Rounding may move the modes of a reduced model this many times as far as a direct solution, but no further
-#: than what rounding leaves of a solution with the smallest reciprocal condition that gives no warning: four digits.
+#: Ratio of the rounding of modes of a reduced model to the rounding of a direct solution, limited by the rounding of a
+#: solution with the smallest reciprocal condition that gives no warning: four digits.
 _LOSS: Final = 30
 _MOST_ROUNDING: Final = float(np.finfo(np.float64).eps) / RCOND_LIMIT
-#: Steps of the iteration; a step that is longer than this share of the one before has reached rounding, if it is
-#: shorter than this share of the solution.
+#: Number of steps of the iteration; share of the previous step above which a step has reached rounding, if it is also
+#: below this share of the solution.
 _STEPS, _SHRINKS, _ROUNDED = 12, 0.5, 1e-6
-#: Shifts to begin with; solutions at each for every force, and in all: few forces need more of them.
+#: Number of initial shifts; of solutions at each for every force, and in all: few forces need more of them.
 _FIRST_SHIFTS, _MOMENTS, _VECTORS = 1, 4, 40
-#: Shifts are added up to this number, and vectors up to this share of the DOFs.
+#: Largest number of shifts, and of vectors as a share of the DOFs.
 _MOST_SHIFTS, _MOST_VECTORS = 40, 0.5
-#: Below this error a refinement that gains less than a factor of three has reached the round-off of the model.
+#: Error below which a refinement that gains less than a factor of three has reached the round-off of the model.
 _NEAR = 1e-4
-#: Directions smaller than this share of their vector are not new.
+#: Relative size of a direction below which it is not new.
 _NEW_DIRECTION = 1e-12
-#: Lines whose residual is computed, and those of them that are solved directly.
+#: Number of lines whose residual is computed, and of lines that are solved directly.
 _CANDIDATES, _SPOTS = 40, 4
-#: From this many DOFs on solutions of the whole model at these lines are found by iteration, not by factors of a line;
-#: from this many on they still cost as much as the rest: only the worst line is compared.
+#: Number of DOFs from which on solutions of the whole model at these lines use iteration instead of factors of a line;
+#: and from which on they still cost as much as the rest, so that only the worst line is compared.
 _ITERATED, _LARGE, _FEW_SPOTS = 2_000, 10_000, 1
 
 
@@ -46,25 +46,25 @@ class TwoLevels:
     Parameters
     ----------
     shift : float
-        s, (rad/s)^2.
+        Shift s, (rad/s)^2.
     factors : Factors
-        Of K - s M.
+        Factors of K - s M.
     modes : Modes
-        Of the reduced model, as a rigid body or not.
+        Modes of the reduced model, including rigid-body modes.
     shapes : ndarray, shape (n, n_modes)
-        Their shapes, 1/sqrt(kg).
+        Shapes of the modes, 1/sqrt(kg).
     n_rigid : int
-        How many of the modes, the first ones, are those of a rigid body: solutions are without them.
+        Number of rigid-body modes, which come first: solutions do not contain them.
     tolerance : float
-        The iteration ends where the difference to the reduced model is sure to be below this share of the solution.
+        Share of the solution below which the difference to the reduced model ends the iteration.
 
     Notes
     -----
-    With Z = alpha K - beta M, and P = K - s M, a step adds P^-1 r / alpha of the residual r, which leaves
-    (beta/alpha - s) / (w_r^2 - s) of an error in mode r: little in the modes above the band. Then it adds what
-    the modes of the reduced model take of the residual, which leaves nothing in the modes that it holds. The fixed
-    point is the solution with the whole model, whatever the reduced model: its quality only sets how fast it is
-    reached [1]_. A complex factorisation takes four times as long as that of P and twice its memory.
+    Let Z = alpha K - beta M, and P = K - s M. A step adds P^-1 r / alpha of the residual r. This multiplies an error in
+    mode r by (beta/alpha - s) / (w_r^2 - s), which is small for modes above the band. The step then adds the
+    contribution of the modes of the reduced model to the residual, which removes the error in these modes. The fixed
+    point is the solution of the whole model for any reduced model, whose quality only sets the speed of convergence
+    [1]_. A complex factorisation takes four times as long as the factorisation of P and twice its memory.
 
     References
     ----------
@@ -81,13 +81,14 @@ class TwoLevels:
     def solve(
         self, matrices: ModelMatrices, omega: float, forces: ComplexArray, outputs: Ports
     ) -> tuple[ComplexArray, ComplexArray] | None:
-        """Solve Z x = b.
+        """Return the solution of Z x = b.
 
         Returns
         -------
         x : ndarray, shape (n, n_forces)
+            Solution.
         step : ndarray, shape (n_out, n_forces)
-            Last step at the responses: rounding; zeros where the tolerance was met before.
+            Last step at the responses, which is rounding; zeros if the tolerance was met before.
         None
             The iteration does not converge.
         """
@@ -133,29 +134,29 @@ def spot_error(
     near: TwoLevels | None = None,
     solver: SparseSolver | None = None,
 ) -> tuple[float, float]:
-    """Largest difference to solutions with the whole model at a few lines, and how small rounding lets it become.
+    """Return the largest difference to solutions of the whole model at a few lines, and its limit by rounding.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_lines,)
         A few frequencies, Hz.
     rigid : RigidModes, optional
-        What is solved by its mass alone.
+        Modes that are solved by their mass alone.
     near : TwoLevels, optional
-        How a large model is solved; where it does not converge, and by default, by complex factors of each line.
+        Solver of a large model; if it does not converge, and by default, complex factors of each line are used.
     solver : SparseSolver, optional
-        One that holds the order of elimination.
+        Solver with the order of elimination.
 
     Returns
     -------
     error : float
-        Relative to the largest entry of the line; inf where there is no solution.
+        Error relative to the largest entry of the line; inf if there is no solution.
     attainable : float
-        A multiple of the last step of a refinement of the solutions, which is all rounding; no more than the
-        rounding of the worst conditioned line that gives no warning.
+        Multiple of the last step of a refinement of the solutions, which is all rounding; at most the rounding of the
+        worst conditioned line that gives no warning.
     """
     found = modes.lines(freq_hz, "nan")[0]
-    parts = held(matrices.n) if rigid is None else rigid
+    parts = no_rigid_modes(matrices.n) if rigid is None else rigid
     own = parts.dynamic_stiffness(matrices, 2 * np.pi * freq_hz)
     forces = inputs.forces()
     straining = parts.straining_forces(forces).astype(np.complex128)
@@ -163,7 +164,7 @@ def spot_error(
     errors, rounding = np.full(freq_hz.size, np.inf), 0.0
     by_line = solver or SparseSolver()
     for i, omega in enumerate(2 * np.pi * freq_hz):
-        if not own[i].all():  # nothing holds the body: superposition names the line as singular
+        if not own[i].all():  # no stiffness resists the body: superposition names the line as singular
             errors[i] = 0
             continue
         solved = None if near is None else near.solve(matrices, omega, straining, outputs)
@@ -207,11 +208,11 @@ class Reduction:
     n_vectors : int
         Size of the reduced model.
     attainable : float
-        What rounding leaves of a direct solution, times what a sum of modes may lose more; 2.2e-4 at most.
+        Rounding of a direct solution, times a factor for a sum of modes; 2.2e-4 at most.
     shapes : ndarray, shape (n, n_vectors)
         Shapes of the modes in all DOFs, 1/sqrt(kg): a basis for models that differ little.
     solver : str
-        What factored the matrices: library and order of elimination.
+        Library and order of elimination of the factors.
     """
 
     modes: Modes
@@ -226,22 +227,23 @@ class Reduction:
 def reduce_model(
     freq_hz: FloatArray, matrices: ModelMatrices, outputs: Ports, inputs: Ports, tolerance: float
 ) -> Reduction:
-    """Project a model on solutions at a few frequencies, more until the error meets the tolerance or falls no more.
+    """Return a projection of a model on solutions at a few frequencies, refined until the tolerance or stagnation.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Frequencies that will be asked for, Hz.
+        Frequencies of later requests, Hz.
     matrices : ModelMatrices
         Symmetric K and M, damping a M + b K and one loss factor.
     outputs, inputs : Ports
+        Responses and forces.
     tolerance : float
         Wanted relative error of a line.
 
     Returns
     -------
     Reduction
-        Its error estimate may exceed the tolerance.
+        Reduced model; its error estimate may exceed the tolerance.
 
     Raises
     ------
@@ -251,15 +253,15 @@ def reduce_model(
     Notes
     -----
     The space is spanned by (K - s M)^-1 B, (K - s M)^-1 M (K - s M)^-1 B, ... at real shifts s = w^2, with unit forces
-    B at inputs and outputs. With damping a M + b K and a loss factor the undamped space serves all dampings; because it
-    serves outputs too, errors of the projection enter the receptance squared. The residual says at which lines the
-    reduced model is worst; there and at both ends, of a large model at the worst line only, it is compared with a
-    direct solution. The error between these lines is not bounded.
+    B at inputs and outputs. With damping a M + b K and a loss factor the undamped space is valid for all dampings.
+    Because it is also valid for outputs, errors of the projection enter the receptance squared. The residual shows the
+    lines at which the reduced model is worst. There and at both ends (for a large model at the worst line only) it is
+    compared with a direct solution. The error between these lines is not bounded.
 
-    A structure that is not held moves as a rigid body, too. Rounding gives these motions a stiffness; near 0 Hz it
-    would spoil any solution, reduced or direct. They are found first and kept out of the space, as are motions that
-    springs hold so softly that K loses half of its digits; they enter as what they are, r r^T / (w_r^2 - w^2) with
-    w_r = 0 where nothing holds them.
+    A free structure also moves as a rigid body. Rounding gives these motions a stiffness, which would spoil any
+    solution near 0 Hz, reduced or direct. They are computed first and kept out of the space. The same applies to
+    motions on springs so soft that K loses half of its digits. They enter separately as r r^T / (w_r^2 - w^2), with
+    w_r = 0 for a free motion.
 
     Cost: a factorisation of a real matrix for the rigid-body modes and one for each shift, of a complex matrix for each
     line of comparison; 40 solutions or more a shift.
@@ -297,7 +299,7 @@ def reduce_model(
 
 
 class _Reducer:
-    """A model, its ports, and the space found so far: orthonormal, without rigid-body modes."""
+    """A model, its ports, and the present space: orthonormal, without rigid-body modes."""
 
     def __init__(
         self, freq_hz: FloatArray, matrices: ModelMatrices, outputs: Ports, inputs: Ports, tolerance: float
@@ -311,14 +313,14 @@ class _Reducer:
         self.solver = SparseSolver()
         self.rigid = find_rigid_modes(self.k, self.m, self.solver)
         self.basis = np.zeros((matrices.n, 0))
-        self.last: tuple[float, Factors] | None = None  # of one shift only: large factors fill the memory
+        self.last: tuple[float, Factors] | None = None  # for one shift only: large factors fill the memory
 
     def extend(self, shift: float) -> None:
         """Add the solutions at one more shift."""
         self.last = None
         try:
             factors = self.solver.factor(self.k - shift * self.m)
-        except SingularMatrixError:  # the next shift will do
+        except SingularMatrixError:  # the next shift is used
             return
         self.last = shift, factors
         vectors = [factors.solve(self.rigid.straining_forces(self.forces))]
@@ -345,7 +347,7 @@ class _Reducer:
         return np.maximum(squared, 0), self.basis @ shapes
 
     def project(self) -> tuple[Reduction, FloatArray]:
-        """Return the reduced model and the frequencies where it is worst, Hz, worst first."""
+        """Return the reduced model and the frequencies of its largest residuals, Hz, worst first."""
         freq, rigid = self.freq_hz, self.rigid
         size = self.basis.shape[1] + len(rigid)
         try:
@@ -365,7 +367,7 @@ class _Reducer:
         worst = self._worst_lines(modes, shapes)
         spots = [worst[0], freq.argmin(), freq.argmax(), *worst[1:]]
         spots = spots[: _SPOTS if self.matrices.n < _LARGE else _FEW_SPOTS]
-        if freq.min() == 0:  # where a structure that is softly held is worst conditioned
+        if freq.min() == 0:  # where a structure on soft springs is worst conditioned
             spots.append(freq.argmin())
         lines = np.unique(spots)
         near = None
@@ -377,9 +379,9 @@ class _Reducer:
         return Reduction(modes, error, freq[lines], size, attainable, shapes, self.solver.used), freq[worst]
 
     def _worst_lines(self, modes: Modes, shapes: FloatArray) -> NDArray[np.intp]:
-        """Lines among candidates in the order of their residual Z x - b, largest first."""
+        """Return lines among candidates in the order of their residual Z x - b, largest first."""
         freq, size = self.freq_hz, shapes.shape[1]
-        # Lengths of sums of these columns are those of sums of the columns of a small triangle.
+        # Lengths of sums of these columns equal lengths of sums of the columns of a small triangle.
         columns = np.hstack([self.k @ shapes, self.m @ shapes, self.inputs.forces()])
         triangle = linalg.qr(columns, mode="r")[0][: columns.shape[1]]
         by_k, by_m, forces = triangle[:, :size], triangle[:, size : 2 * size], triangle[:, 2 * size :]

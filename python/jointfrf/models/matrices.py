@@ -1,4 +1,4 @@
-"""The matrices of a model as given: sizes, bands, symmetry, kind of damping; and where it is driven and observed."""
+"""Matrices of a model as given: sizes, bands, symmetry, kind of damping; and its responses and forces."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ __all__ = ["Matrix", "ModelMatrices", "Operand", "Ports", "as_ports", "direction
 Matrix = Any  # array_like or scipy sparse array
 Operand = Any  # ndarray or scipy sparse array
 
-#: Two entries differ by no more than this share of the largest where a matrix is called symmetric.
+#: Difference of two entries, relative to the largest, up to which a matrix is symmetric.
 _SYMMETRIC = 1e-10
-#: Up to this size sparse matrices are turned into arrays: the overhead of scipy for their entries would exceed the
+#: Size up to which sparse matrices are turned into arrays: the overhead of scipy for their entries would exceed the
 #: time of the computation.
 _SMALL = 64
-#: Up to this size products, sums and factors of arrays take no longer than those of sparse matrices.
+#: Size up to which products, sums and factors of arrays take no longer than of sparse matrices.
 _FULL = 200
-#: Damping is a M + b K where no entry differs by more than this share of the largest.
+#: Difference of entries, relative to the largest, up to which damping is a M + b K.
 _PROPORTIONAL = 1e-13
 
 
@@ -35,18 +35,18 @@ class ModelMatrices:
     Parameters
     ----------
     stiffness, mass : array_like or scipy sparse array, shape (n, n)
-        K in N/m, M in kg.
+        Stiffness K, N/m, and mass M, kg.
     damping : array_like or sparse array, shape (n, n), optional
         Viscous damping C, N s/m.
     structural_damping : array_like or sparse array, shape (n, n), optional
         Structural damping H, N/m.
     loss_factor : float
-        eta of the whole stiffness.
+        Loss factor eta of the whole stiffness.
 
     Attributes
     ----------
     named : dict of str to ndarray, sparse array or None
-        The matrices by the names that the caller knows; sparse ones of a small model as arrays.
+        Matrices by their names in messages; sparse ones of a small model as arrays.
     n : int
         Number of DOFs.
     """
@@ -85,19 +85,19 @@ class ModelMatrices:
             if not is_sparse:
                 matrix = self.named[name] = as_real(name, matrix, (n, n))
             half = _half(matrix)
-            # Beside a stiffness that is not symmetric, as with rotors or friction, half a matrix may be meant.
+            # With a stiffness that is not symmetric, as for rotors or friction, half a matrix may be meant.
             if half is not None and (name == "stiffness" or self.is_symmetric("stiffness")):
-                raise ValueError(f"{name} holds its {half} triangle only; complete it by from_triangle")
+                raise ValueError(f"{name} contains its {half} triangle only; complete it by from_triangle")
 
     def dense(self, name: str) -> FloatArray | None:
-        """Return a matrix as an array, shape (n, n); None where the model has none."""
+        """Return a matrix as an array, shape (n, n); None if the model has none."""
         matrix = self.named[name]
         if matrix is None or isinstance(matrix, np.ndarray):
             return matrix
         return as_real(name, matrix.toarray(), (self.n, self.n))
 
     def sparse(self, name: str) -> sparse.csc_array:
-        """Return a matrix by its entries, shape (n, n); empty where the model has none."""
+        """Return a matrix by its entries, shape (n, n); empty if the model has none."""
         matrix = self.named[name]
         if matrix is None:
             return sparse.csc_array((self.n, self.n))
@@ -107,9 +107,9 @@ class ModelMatrices:
         return found
 
     def operand(self, name: str) -> Operand:
-        """Return a matrix in the form that is quicker to compute with; zeros where the model has none.
+        """Return a matrix in the form that is quicker to compute with; zeros if the model has none.
 
-        That is an array, shape (n, n), of a model of few DOFs, whatever was given, and `sparse` of a larger one.
+        That is an array, shape (n, n), for few DOFs, whatever was given, and `sparse` for more.
         """
         matrix = self.named[name]
         if self.n > _FULL:
@@ -141,11 +141,11 @@ class ModelMatrices:
         return below, above
 
     def is_symmetric(self, name: str) -> bool:
-        """Whether K or M is symmetric."""
+        """Return whether K or M is symmetric."""
         return is_symmetric(self.operand(name))
 
     def check_symmetric(self, otherwise: str) -> None:
-        """Raise unless K and M are symmetric; `otherwise` is the consequence in the message."""
+        """Raise an error unless K and M are symmetric; `otherwise` is the consequence in the message."""
         for name in ("stiffness", "mass"):
             if not self.is_symmetric(name):
                 raise ValueError(f"{name} is not symmetric: {otherwise}")
@@ -162,7 +162,7 @@ class ModelMatrices:
 
     @cached_property
     def proportional(self) -> tuple[float, float, float] | None:
-        """(a, b, eta) where C = a M + b K and all structural damping is eta K, else None; 1/s, s, 1."""
+        """Coefficients (a, b, eta) if C = a M + b K and all structural damping is eta K, else None; 1/s, s, 1."""
         k, m = self.operand("stiffness"), self.operand("mass")
         viscous = _combination(self.operand("damping"), m, k)
         structural = _combination(self.operand("structural_damping"), 0 * m, k)
@@ -172,7 +172,7 @@ class ModelMatrices:
 
 
 def is_symmetric(matrix: Operand) -> bool:
-    """Whether a matrix is symmetric to rounding."""
+    """Return whether a matrix is symmetric to rounding."""
     return _is_own_transpose(matrix) or bool(_largest(matrix - matrix.T) <= _SYMMETRIC * _largest(matrix))
 
 
@@ -182,16 +182,21 @@ def from_triangle(matrix: Matrix) -> Matrix:
     Parameters
     ----------
     matrix : array_like or scipy sparse array, shape (n, n)
-        Its other triangle is empty, as finite-element programs write symmetric matrices.
+        Matrix with an empty second triangle, as finite-element programs write symmetric matrices.
 
     Returns
     -------
     ndarray or scipy sparse array, shape (n, n)
+        Symmetric matrix.
 
     Raises
     ------
     ValueError
         The matrix is not square, or has entries on both sides of the diagonal.
+
+    See Also
+    --------
+    Model : a model by its matrices.
 
     Examples
     --------
@@ -211,16 +216,16 @@ def from_triangle(matrix: Matrix) -> Matrix:
 
 
 def _is_own_transpose(matrix: Matrix) -> bool:
-    """Whether a matrix is an array that is bit-identical to its transpose, which is found quickly."""
+    """Return whether a matrix is an array that is bit-identical to its transpose, by a quick test."""
     if not isinstance(matrix, np.ndarray):
         return False
-    if len(matrix) <= _SMALL and matrix.tobytes() == matrix.tobytes("F"):  # all but zeros of two signs
+    if len(matrix) <= _SMALL and matrix.tobytes() == matrix.tobytes("F"):  # except for zeros of two signs
         return True
     return bool(np.count_nonzero(matrix == matrix.T) == matrix.size)
 
 
 def _half(matrix: Matrix) -> str | None:
-    """Return which triangle of a matrix is there where the other is empty."""
+    """Return which triangle of a matrix has entries if the other is empty."""
     if _is_own_transpose(matrix):
         return None
     below, above = _sides(matrix)
@@ -243,7 +248,7 @@ def _largest(matrix: Operand) -> float:
 
 
 def _combination(c: Operand, m: Operand, k: Operand) -> tuple[float, float] | None:
-    """Return a, b of C = a M + b K; the simplest that holds."""
+    """Return a, b of C = a M + b K; the simplest pair that is valid."""
     if _largest(c) == 0:
         return 0.0, 0.0
     kk, mm, km = (k * k).sum(), (m * m).sum(), (k * m).sum()
@@ -266,7 +271,7 @@ class Ports:
     n : int
         Number of DOFs.
     picked : ndarray of int, or None
-        The DOFs, counted from 1, where each port is one of them.
+        DOF of each port, counted from 1, if each port is a DOF.
     sums : sparse array, shape (m, n), or None
         Otherwise weights of all DOFs for each port.
     """
@@ -281,7 +286,7 @@ class Ports:
 
     @cached_property
     def weights(self) -> sparse.csr_array:
-        """Weights of the DOFs for each port, shape (m, n); small models never ask for them."""
+        """Weights of the DOFs for each port, shape (m, n); not needed for small models."""
         if self.picked is None:
             return cast(sparse.csr_array, self.sums)
         entries = (np.ones(self.picked.size), (np.arange(self.picked.size), self.picked - 1))
@@ -289,12 +294,12 @@ class Ports:
 
     @property
     def needed(self) -> NDArray[np.int32]:
-        """DOFs with a weight, ascending, counted from 1; the first where no port has one."""
+        """DOFs with a weight, ascending, counted from 1; the first if no port has one."""
         found = np.unique(self.weights.indices) if self.weights.nnz else np.zeros(1)
         return found.astype(np.int32) + np.int32(1)
 
     def of(self, shapes: NDArray[Any]) -> NDArray[Any]:
-        """Return the displacements at the ports from those of all DOFs, shape (n, k) to (m, k)."""
+        """Return the displacements at the ports from displacements of all DOFs, shape (n, k) to (m, k)."""
         return self.weights @ shapes if self.picked is None else shapes[self.picked - 1]
 
     def forces(self) -> FloatArray:
@@ -303,7 +308,7 @@ class Ports:
 
 
 def as_ports(name: str, value: Any, n: int) -> Ports:
-    """Check DOFs counted from 0, or a matrix of weights of shape (m, n); all DOFs for None."""
+    """Return ports from DOFs counted from 0, or from a matrix of weights of shape (m, n); all DOFs for None."""
     if value is None:
         return Ports(n, np.arange(1, n + 1, dtype=np.int32))
     is_sparse = sparse.issparse(value)

@@ -1,4 +1,4 @@
-"""Receptance of a model as a sum over modes; rigid-body modes apart, whose stiffness is hidden by rounding of K."""
+"""Receptance of a model as a sum over modes; separate rigid-body modes, whose stiffness rounding of K hides."""
 
 from __future__ import annotations
 
@@ -15,20 +15,29 @@ from jointfrf.kernel.call import N_FREQ, RCOND_LIMIT, LineStatus, OnSingular, ch
 from jointfrf.models.factors import SingularMatrixError, SparseSolver, factor
 from jointfrf.models.matrices import ModelMatrices, Operand, Ports
 
-__all__ = ["SINGULAR", "ModalFrfs", "Modes", "RigidModes", "all_modes", "find_rigid_modes", "held", "mode_condition"]
+__all__ = [
+    "SINGULAR",
+    "ModalFrfs",
+    "Modes",
+    "RigidModes",
+    "all_modes",
+    "find_rigid_modes",
+    "mode_condition",
+    "no_rigid_modes",
+]
 
-#: A fine mesh in mixed units has rcond 1e-13 and still gives nine digits: only below this is a line singular.
+#: Reciprocal condition below which a line is singular: a fine mesh in mixed units has 1e-13 and still nine digits.
 SINGULAR = _EPS = float(np.finfo(np.float64).eps)
-#: r^T K r counts as zero within this many roundings of its terms: an entry of K is a sum of some tens of rounded terms.
+#: Number of roundings of its terms within which r^T K r is zero: an entry of K is a sum of some tens of rounded terms.
 _ROUNDINGS = 32
-#: Modes are treated apart where K r loses half of all digits, and w^2 of the next mode is this many times higher.
+#: Modes are separate if K r loses half of all digits, and w^2 of the next mode is higher by this factor.
 _SOFT, _GAP = _EPS**0.5, 100
-#: Modes looked for at first; the shift of the inverse iteration in roundings, so that the factors of K + shift M keep
-#: two digits of a free structure; most iterations, and the change of w^2 at which they end.
+#: Initial number of modes; the shift of the inverse iteration in roundings, so that the factors of K + shift M keep two
+#: digits of a free structure; largest number of iterations, and the change of w^2 at which they end.
 _BLOCK, _SHIFT, _ITERATIONS, _SETTLED = 8, 100, 20, 0.1
-#: LAPACK's columns a block: with less work space it may take fewer.
+#: Block size of LAPACK: with less work space it may use fewer columns.
 _LAPACK_BLOCK = 64
-#: A modal damping matrix is diagonal if nothing beside its diagonal exceeds this share of it.
+#: Largest share of the diagonal that entries off it may have in a diagonal modal damping matrix.
 _DIAGONAL = 1e-8
 
 
@@ -39,12 +48,12 @@ class RigidModes:
     Parameters
     ----------
     shapes, momenta : ndarray, shape (n, k)
-        r with unit modal masses, and M r.
+        Shapes r with unit modal masses, and M r.
     stiffness : ndarray, shape (k,)
-        w_r^2 = r^T K r, (rad/s)^2; 0 where it may be rounding.
+        Modal stiffness w_r^2 = r^T K r, (rad/s)^2; 0 if it may be rounding.
     uncertainty : ndarray, shape (k,)
-        How far w_r^2 may be from the stiffness that is meant, (rad/s)^2: by a rounding of its terms; where it was taken
-        as zero, by what it was if that is more than a rounding, else not at all.
+        Possible error of w_r^2, (rad/s)^2, by a rounding of its terms. If w_r^2 was set to zero, the error is its
+        original value if this is more than a rounding, else zero.
     """
 
     shapes: FloatArray
@@ -72,13 +81,13 @@ class RigidModes:
         return np.asarray(motion - self.shapes @ (self.momenta.T @ motion))
 
 
-def held(n: int) -> RigidModes:
-    """No rigid-body modes: a structure of n DOFs that is held."""
+def no_rigid_modes(n: int) -> RigidModes:
+    """Return no rigid-body modes, for a structure of n DOFs that is not free."""
     return RigidModes(np.zeros((n, 0)), np.zeros((n, 0)), np.zeros(0), np.zeros(0))
 
 
 def resistance(matrices: ModelMatrices, name: str, shapes: FloatArray) -> FloatArray:
-    """Return r^T A r of each shape, shape (k,); 0 where it may be rounding of A, or the model has none."""
+    """Return r^T A r of each shape, shape (k,); 0 if it may be rounding of A, or the model has none."""
     if matrices.named[name] is None:
         return np.zeros(shapes.shape[1])
     matrix = matrices.operand(name)
@@ -89,7 +98,7 @@ def resistance(matrices: ModelMatrices, name: str, shapes: FloatArray) -> FloatA
 def mode_condition(dynamic_stiffness: ComplexArray, uncertainty: FloatArray) -> FloatArray:
     """Return the reciprocal condition of lines, shape (n_freq,), from r^T Z r of modes that rounding may hide.
 
-    eps / rcond is the relative change of a mode by the uncertainty of its w_r^2; 0 where nothing holds the mode.
+    eps / rcond is the relative change of a mode by the uncertainty of its w_r^2; 0 if no stiffness resists the mode.
     """
     left = abs(dynamic_stiffness)
     rcond = np.divide(_EPS * left, uncertainty, out=np.ones_like(left), where=uncertainty > 0)
@@ -97,28 +106,28 @@ def mode_condition(dynamic_stiffness: ComplexArray, uncertainty: FloatArray) -> 
 
 
 def find_rigid_modes(k: Operand, m: Operand, solver: SparseSolver | None = None) -> RigidModes:
-    """Find the modes whose stiffness rounding hides, by inverse iteration of a block of vectors.
+    """Return the modes whose stiffness rounding hides, by inverse iteration of a block of vectors.
 
     Parameters
     ----------
     k, m : ndarray or sparse array, shape (n, n)
-        Symmetric; both of one kind.
+        Symmetric stiffness and mass, both of one kind.
     solver : SparseSolver, optional
-        One that is used for sparse matrices of this pattern elsewhere.
+        Solver that is also used for other sparse matrices of this pattern.
 
     Returns
     -------
     RigidModes
-        Empty where the structure is held, where M has no mass in a motion that K does not resist, and where no gap
-        separates them from the modes above.
+        Separate modes. Empty if the structure is not free, if M has no mass in a motion that K does not resist, or if
+        no gap separates them from the modes above.
 
     Notes
     -----
-    Subspace iteration with a shift [1]_: (K + s M)^-1 M on a block of vectors, and its Ritz values. s is 100 roundings
-    of the mean of the terms of w^2, so the factors exist whether K is singular or not, and every other mode fades
-    by s / w^2 an iteration. What rounding of the entries of K may change w_r^2 by is eps |r|^T |K| |r|, whatever the
-    units of its rows are [2]_. Below some of these roundings w_r^2 is taken as zero, and the structure as free in r. It
-    makes no difference which of the modes the forces reach, nor how a processor orders its sums.
+    Subspace iteration with a shift [1]_: (K + s M)^-1 M on a block of vectors, and its Ritz values. The shift s is 100
+    roundings of the mean of the terms of w^2. The factors thus exist even if K is singular, and every other mode
+    decreases by s / w^2 in an iteration. Rounding of the entries of K may change w_r^2 by eps |r|^T |K| |r|, for any
+    units of its rows [2]_. Below some of these roundings w_r^2 is set to zero, and the structure is free in r. The
+    result does not depend on the modes that the forces reach, or on the order of sums of a processor.
 
     Cost: a factorisation of a real matrix of the structure of K, and 8 solutions with it in each of 3 to 5 iterations;
     less than one of the shifts of a reduction.
@@ -134,7 +143,7 @@ def find_rigid_modes(k: Operand, m: Operand, solver: SparseSolver | None = None)
     while True:
         found = _lowest_modes(k, magnitudes, m, size, solver)
         if found is None:
-            return held(n)
+            return no_rigid_modes(n)
         squared, shapes, terms = found
         known = np.maximum(squared, _EPS * terms)
         soft = np.logical_and.accumulate(known <= _SOFT * terms)
@@ -146,8 +155,8 @@ def find_rigid_modes(k: Operand, m: Operand, solver: SparseSolver | None = None)
     apart = np.flatnonzero(soft & (above >= _GAP * known))
     count = apart[-1] + 1 if apart.size else 0
     if not count:
-        return held(n)
-    # apart from the others once more, whose w^2 is large enough to spoil the last digits of these
+        return no_rigid_modes(n)
+    # separate again from higher modes, whose w^2 is large enough to spoil the last digits of these
     squared, shapes, terms = _ritz(k, magnitudes, m, shapes[:, :count])
     rounding = _EPS * terms
     free = squared <= _ROUNDINGS * rounding
@@ -158,7 +167,7 @@ def find_rigid_modes(k: Operand, m: Operand, solver: SparseSolver | None = None)
 def _lowest_modes(
     k: Operand, magnitudes: Operand, m: Operand, size: int, solver: SparseSolver | None
 ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """Return w^2, shapes (n, size) and the terms of w^2 of the lowest modes; None where K + s M is singular."""
+    """Return w^2, shapes (n, size) and the terms of w^2 of the lowest modes; None if K + s M is singular."""
     masses = m.diagonal()
     with_mass = masses > 0
     unit = np.sqrt(np.divide(1, masses, out=np.zeros_like(masses), where=with_mass))  # unit mass in every DOF
@@ -240,15 +249,15 @@ class Modes:
     Parameters
     ----------
     stiffness : ndarray, shape (n_modes,)
-        w_r^2, (rad/s)^2.
+        Modal stiffness w_r^2, (rad/s)^2.
     damping : ndarray, shape (n_modes,)
-        Viscous, 2 zeta w_r, rad/s.
+        Viscous modal damping 2 zeta w_r, rad/s.
     loss_factor : ndarray, shape (n_modes,)
-        eta of each mode.
+        Loss factor eta of each mode.
     shapes_out, shapes_in : ndarray, shape (n_out, n_modes), (n_in, n_modes)
         Shapes at responses and forces, 1/sqrt(kg).
     uncertainty : ndarray, shape (n_modes,)
-        Uncertainty of w_r^2 by rounding of K, (rad/s)^2, of modes that it may hide, see `RigidModes`; else 0.
+        Uncertainty of w_r^2 by rounding of K, (rad/s)^2, for modes that it may hide, see `RigidModes`; else 0.
     """
 
     stiffness: FloatArray
@@ -259,12 +268,12 @@ class Modes:
     uncertainty: FloatArray
 
     def receptance(self, freq_hz: FloatArray, on_singular: OnSingular, out: ComplexArray | None = None) -> ComplexArray:
-        """Sum of phi phi^T / (w_r^2 (1 + i eta) - w^2 + i w c) over the modes.
+        """Return the sum of phi phi^T / (w_r^2 (1 + i eta) - w^2 + i w c) over the modes.
 
         Returns
         -------
         ndarray, shape (n_freq, n_out, n_in)
-            m/N.
+            Receptances, m/N.
         """
         result, status = self.lines(freq_hz, on_singular, out)
         check_lines("receptance", status, {}, freq_hz, "nan", RCOND_LIMIT)
@@ -275,8 +284,8 @@ class Modes:
     ) -> tuple[ComplexArray, LineStatus]:
         """Return the sum and the status of each line; lines that are ill-conditioned give no warning yet.
 
-        Their reciprocal condition is that of all modes where it is below the machine's precision, and otherwise such
-        that eps / rcond is the relative change of a mode by its uncertainty.
+        The reciprocal condition of a line includes all modes if it is below the machine's precision. Otherwise
+        eps / rcond is the relative change of a mode by its uncertainty.
         """
         shape = (freq_hz.size, self.shapes_out.shape[0], self.shapes_in.shape[0])
         omega = 2 * np.pi * freq_hz
@@ -303,7 +312,7 @@ class Modes:
 
 
 def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> tuple[Modes, RigidModes]:
-    """Return all modes of a model whose damping does not couple them, and those as a rigid body among them.
+    """Return all modes of a model whose damping does not couple them, and the rigid-body modes among them.
 
     Raises
     ------
@@ -312,8 +321,8 @@ def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> tuple[M
 
     Notes
     -----
-    An eigenvalue solver knows every w^2 within rounding of the largest one; rigid-body modes, and those of a soft
-    suspension, are found apart, see `find_rigid_modes`.
+    An eigenvalue solver gives every w^2 within rounding of the largest one. Rigid-body modes, and modes of a soft
+    suspension, are therefore computed separately, see `find_rigid_modes`.
     """
     matrices.check_symmetric("method 'modal' cannot be used, 'dense' or 'sparse' can")
     k, m = matrices.dense("stiffness"), matrices.dense("mass")
@@ -342,7 +351,7 @@ def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> tuple[M
     structural = modal("structural_damping")
     alone = resistance(matrices, "structural_damping", rigid.shapes)
     structural[: len(rigid)] = alone
-    stiffness[: len(rigid)] = np.where(rigid.stiffness > 0, rigid.stiffness, SINGULAR * alone)  # held by H alone
+    stiffness[: len(rigid)] = np.where(rigid.stiffness > 0, rigid.stiffness, SINGULAR * alone)  # resisted by H alone
     losses = matrices.loss_factor + np.divide(structural, stiffness, out=np.zeros(matrices.n), where=stiffness > 0)
     modes = Modes(stiffness, modal("damping"), losses, outputs.of(shapes), inputs.of(shapes), uncertainty)
     return modes, rigid
@@ -355,10 +364,11 @@ class ModalFrfs:
     Attributes
     ----------
     dofs : tuple of str, length n
+        Names of the DOFs.
     poles : ndarray, shape (m,)
-        s of the upper half plane, rad/s.
+        Poles s of the upper half plane, rad/s.
     shapes : ndarray, shape (n, m)
-        psi, scaled so that the residues are psi psi^T.
+        Shapes psi, scaled so that the residues are psi psi^T.
     rigid : ndarray, shape (n, k)
         Motions at 0 Hz, phi / sqrt(modal mass).
     lower, upper : ndarray, shape (n, n)
@@ -392,11 +402,11 @@ class ModalFrfs:
         Parameters
         ----------
         freq_hz : ndarray, shape (n_freq,)
-            Above 0 Hz.
+            Frequencies, Hz, above 0.
         h : ndarray, shape (n_freq, k, k)
-            Receptances, m/N; NaN where nothing was measured: then h_qp stands for h_pq, or there are no residuals.
+            Receptances, m/N; NaN if not measured: then h_qp replaces h_pq, or there are no residuals.
         at : sequence of int
-            Their DOFs.
+            Numbers of their DOFs.
         """
         lower, upper = self.lower.copy(), self.upper.copy()
         left = h - self.receptance(freq_hz, at)

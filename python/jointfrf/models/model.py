@@ -20,12 +20,12 @@ from jointfrf.models.receptance import ReceptanceMethod, receptance
 
 __all__ = ["Ground", "Model", "assemble", "chain", "shift_of", "with_modal_damping"]
 
-#: Up to this size all modes are computed, beyond it only those asked for.
+#: Size up to which all modes are computed; beyond it only the requested ones.
 _DENSE_LIMIT = 50
-#: Modes are those about minus this share of the mean w^2 of single DOFs: below zero, so that K - shift M is regular for
-#: a free structure, too, and so far that its condition leaves eight digits (at 1 Hz it left five).
+#: Share of the mean w^2 of single DOFs below zero at which modes are computed: K - shift M is then regular for a free
+#: structure, too, and its condition leaves eight digits (at 1 Hz it left five).
 _SHIFT = 1e-8
-#: A model has at most so many rigid-body motions; theirs are frequencies below this share of the next ones.
+#: Largest number of rigid-body motions; their frequencies are below this share of the next ones.
 _RIGID, _ELASTIC = 6, 1e-3
 Ground = Literal["none", "start", "end", "both"]
 _Model = TypeVar("_Model", bound="Model")
@@ -38,7 +38,7 @@ class Model:
     Parameters
     ----------
     stiffness, mass : scipy sparse array or ndarray, shape (n, n)
-        K in N/m and M in kg.
+        Stiffness K, N/m, and mass M, kg.
     dofs : tuple of str
         Names of the DOFs, ``"node:direction"`` with nodes counted from 1.
     damping : sparse array or ndarray, shape (n, n), optional
@@ -46,7 +46,7 @@ class Model:
     structural_damping : sparse array or ndarray, shape (n, n), optional
         Structural damping H, N/m.
     loss_factor : float
-        Loss factor of the whole stiffness, K (1 + i eta).
+        Loss factor of the whole stiffness, K (1 + i eta), default 0.
 
     Examples
     --------
@@ -71,10 +71,10 @@ class Model:
         n = np.shape(self.stiffness)[0]
         object.__setattr__(self, "dofs", as_names("dofs", self.dofs))
         if len(self.dofs) != n or len(set(self.dofs)) != n:
-            raise ValueError(f"dofs must name {n} different DOFs, those of stiffness, not {len(set(self.dofs))}")
+            raise ValueError(f"dofs must name {n} different DOFs of stiffness, not {len(set(self.dofs))}")
 
     def index(self, *names: str) -> int | list[int]:
-        """Return the number of a DOF, or the list of several, counted from 0.
+        """Return the number of a DOF, or the list of several numbers, counted from 0.
 
         Raises
         ------
@@ -89,7 +89,7 @@ class Model:
         return found[0] if len(found) == 1 else found
 
     def ports(self, *names: str) -> list[int] | sparse.csr_array:
-        """Return what `jointfrf.receptance` takes as outputs or inputs for these names: here DOFs, counted from 0.
+        """Return the argument `outputs` or `inputs` of `jointfrf.receptance` for these names: DOFs, counted from 0.
 
         Raises
         ------
@@ -106,9 +106,9 @@ class Model:
         inputs: Sequence[str] | ArrayLike | Matrix | None = None,
         method: ReceptanceMethod = "auto",
     ) -> ComplexArray:
-        """Receptance of the model, see `jointfrf.receptance`; `inputs` are the `outputs` by default.
+        """Return the receptance of the model, see `jointfrf.receptance`; `inputs` are the `outputs` by default.
 
-        Both are names of DOFs, or what `jointfrf.receptance` takes.
+        Both are names of DOFs, or arguments of `jointfrf.receptance`.
         """
         outputs = self._numbered(outputs)
         return receptance(
@@ -124,7 +124,7 @@ class Model:
         )
 
     def _numbered(self, ports: Any) -> Any:
-        """Return the numbers of DOFs that are named, anything else as it is."""
+        """Return the numbers of named DOFs, any other argument unchanged."""
         if isinstance(ports, str):
             return self.ports(ports)
         if isinstance(ports, list | tuple) and ports and all(isinstance(one, str) for one in ports):
@@ -132,53 +132,53 @@ class Model:
         return ports
 
     def natural_frequencies(self, count: int | None = None) -> FloatArray:
-        """Undamped natural frequencies, lowest first.
+        """Return undamped natural frequencies, lowest first.
 
         Parameters
         ----------
         count : int, optional
-            How many; all by default.
+            Number of frequencies; all by default.
 
         Returns
         -------
         ndarray, shape (count,)
-            Hz.
+            Natural frequencies, Hz.
         """
         return self.modes(count)[0]
 
     def modes(self, count: int | None = None) -> tuple[FloatArray, FloatArray]:
-        """Undamped natural frequencies, lowest first, and their shapes.
+        """Return undamped natural frequencies, lowest first, and their shapes.
 
         Parameters
         ----------
         count : int, optional
-            How many; all by default.
+            Number of modes; all by default.
 
         Returns
         -------
         freq_hz : ndarray, shape (count,)
-            Hz; about 0 for a rigid-body motion. Fewer than asked for where DOFs have no mass.
+            Natural frequencies, Hz; about 0 for a rigid-body motion. Fewer than requested if DOFs have no mass.
         shapes : ndarray, shape (n, count)
-            Unit modal masses, 1/sqrt(kg).
+            Shapes of unit modal masses, 1/sqrt(kg).
 
         Raises
         ------
         ValueError
-            There are no modes: mass or stiffness is negative or not symmetric, or a motion has neither.
+            There are no modes: mass or stiffness is negative or not symmetric, or both are zero for a motion.
         """
         n = len(self.dofs)
         matrices = ModelMatrices(self.stiffness, self.mass, None, None, 0.0)
-        matrices.check_symmetric("the model has no real modes")  # half of it would be read
+        matrices.check_symmetric("the model has no real modes")  # else half of it would be used
         k, m = matrices.sparse("stiffness"), matrices.sparse("mass")
         try:
             if count is None or count > n - 2 or n <= _DENSE_LIMIT:
                 squared, shapes = _all_modes(k.toarray(), m.toarray())
             else:
-                # A fixed start, to repeat.
+                # A fixed start makes results reproducible.
                 squared, shapes = sparse_linalg.eigsh(k, count, m, sigma=shift_of(k, m), v0=np.ones(n))
         except (linalg.LinAlgError, RuntimeError) as error:
             raise ValueError(
-                "the model has no modes: a motion has neither stiffness nor mass, or one of them is negative"
+                "the model has no modes: a motion has no stiffness and no mass, or one of them is negative"
             ) from error
         order = np.argsort(squared)[:count]
         freq: FloatArray = np.sqrt(np.maximum(squared[order], 0)) / (2 * np.pi)
@@ -191,18 +191,24 @@ def with_modal_damping(model: _Model, ratios: ArrayLike) -> _Model:
     Parameters
     ----------
     model : Model
+        Model without this damping.
     ratios : array_like, shape (n,)
-        Damping ratios of its lowest elastic modes; those beyond have none of it.
+        Damping ratios of its lowest elastic modes; higher modes get no damping.
 
     Returns
     -------
     Model
-        The same type, with a full matrix C = M Phi diag(2 zeta omega) Phi^T M added to the damping that it has.
+        Model of the same type, with a full matrix C = M Phi diag(2 zeta omega) Phi^T M added to its damping.
 
     Raises
     ------
     ValueError
         A negative ratio, more ratios than elastic modes.
+
+    See Also
+    --------
+    Model.modes : undamped modes.
+    beam, plate : models of structures.
 
     Examples
     --------
@@ -228,12 +234,12 @@ def with_modal_damping(model: _Model, ratios: ArrayLike) -> _Model:
 
 
 def shift_of(k: Matrix, m: Matrix) -> float:
-    """Return where K - shift M is regular and well-conditioned for a free structure, too, (rad/s)^2."""
+    """Return a shift for which K - shift M is regular and well-conditioned, also for a free structure, (rad/s)^2."""
     return -_SHIFT * float(abs(k.diagonal()).sum() / max(abs(m.diagonal()).sum(), 1e-300))
 
 
 def _all_modes(k: FloatArray, m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Squared natural circular frequencies and shapes; those of DOFs without mass are infinite and left out."""
+    """Return squared natural circular frequencies and shapes; infinite ones of DOFs without mass are omitted."""
     try:
         squared, shapes = linalg.eigh(k, m)
     except linalg.LinAlgError:
@@ -254,27 +260,33 @@ def _block_diagonal(
 
 
 def assemble(a: Model, b: Model, joint: Joint | LawJoint, dofs_a: Sequence[int], dofs_b: Sequence[int]) -> Model:
-    """Assembly of two models through a joint, by adding the joint to the matrices.
+    """Return the assembly of two models through a joint, by adding the joint to the matrices.
 
     Parameters
     ----------
     a, b : Model
-        The substructures.
+        Models of the substructures.
     joint : Joint or LawJoint
-        The joint; laws that are springs and dampers, their masses on either side.
+        Joint; its laws must be springs and dampers, its masses are on either side.
     dofs_a, dofs_b : sequence of int
         Joint DOFs j of A and k of B, counted from 0, in the order of the joint.
 
     Returns
     -------
     Model
-        DOFs of A (named ``"A/..."``), then of B (``"B/..."``). A loss factor becomes a structural damping matrix.
+        Assembly with DOFs of A (named ``"A/..."``), then of B (``"B/..."``). A loss factor becomes a structural damping
+        matrix.
 
     Raises
     ------
     ValueError
-        The numbers of DOFs differ; a rigid DOF, or a law that depends on frequency: matrices cannot hold these,
-        `couple` takes them.
+        The numbers of DOFs differ; a rigid DOF, or a law that depends on frequency: matrices cannot contain these, use
+        `couple`.
+
+    See Also
+    --------
+    couple : FRFs of an assembly, for any joint.
+    Assembly : an assembly with unknowns, for fits.
 
     Examples
     --------
@@ -334,30 +346,35 @@ def chain(
     ground: Ground = "start",
     loss_factor: float = 0.0,
 ) -> Model:
-    """Chain of masses with a spring and a dashpot between neighbours (figure 3-1).
+    """Return a chain of masses with a spring and a dashpot between neighbours (figure 3-1).
 
     Parameters
     ----------
     masses : array_like, shape (n,)
-        kg.
+        Masses, kg.
     stiffness : array_like, shape (n_springs,)
         Springs from the first to the last, N/m: n - 1 between the masses, and one more for each grounded end.
     damping : array_like, shape (n_springs,), optional
-        Dashpots beside the springs, N s/m.
+        Dashpots parallel to the springs, N s/m; none by default.
     ground : {"start", "end", "both", "none"}
-        Which ends are held by a spring to the ground.
+        Ends that a spring connects to the ground.
     loss_factor : float
-        Loss factor of all springs.
+        Loss factor of all springs, default 0.
 
     Returns
     -------
     Model
-        DOFs ``"1:x"`` ... ``"n:x"``.
+        Chain with DOFs ``"1:x"`` ... ``"n:x"``.
 
     Raises
     ------
     ValueError
         A mass that is not positive, or a wrong number of springs.
+
+    See Also
+    --------
+    beam : beams.
+    rigid_body : rigid bodies.
 
     Examples
     --------
@@ -375,7 +392,7 @@ def chain(
     c = None if damping is None else as_real("damping", damping, (count,))
 
     def assembled(springs: FloatArray) -> sparse.dia_array:
-        links = np.zeros(m.size + 1)  # link i lies before mass i, the last one after the last mass
+        links = np.zeros(m.size + 1)  # link i is before mass i, the last one after the last mass
         links[first : first + count] = springs
         diagonals = {-1: -links[1:-1], 0: links[:-1] + links[1:], 1: -links[1:-1]}
         if m.size == 1:

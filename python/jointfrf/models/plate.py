@@ -27,13 +27,13 @@ __all__ = ["Edge", "PlateRegion", "plate"]
 
 Edge = Literal["free", "supported", "clamped"]
 
-#: Polynomial degree of an element in either direction: five nodes, equally spaced, on each side.
+#: Polynomial degree of an element in either direction: five equally spaced nodes on each side.
 _DEGREE = 4
 #: Shear correction factor of a rectangular section (Reissner).
 _SHEAR_FACTOR = 5 / 6
-#: A corner is on an edge that it passes by no more than this share of the side.
+#: Distance of a corner from an edge, as a share of the side, up to which it is on the edge.
 _ROUNDING = 1e-9
-#: Directions in which a node moves.
+#: Directions of motion of a node.
 _MOVES = ("z", "theta_x", "theta_y")
 
 
@@ -43,9 +43,9 @@ class PlateRegion(NamedTuple):
     Attributes
     ----------
     low, high : (float, float)
-        x, y of two corners, m, in the coordinates of the plate with its origin; a line has x or y in common.
+        Coordinates x, y of two corners, m, relative to the origin of the plate; a line has x or y in common.
     degree : int or (int, int), optional
-        Polynomials of the motion there, as of a `NodeRegion`.
+        Degree of the polynomials of the motion, see `NodeRegion`.
     """
 
     low: tuple[float, float]
@@ -68,38 +68,44 @@ def plate(
     regions: Mapping[str, PlateRegion] | None = None,
     loss_factor: float = 0.0,
 ) -> PointModel:
-    """Rectangular plate of uniform thickness in the plane of x and y, bending in z.
+    """Return a rectangular plate of uniform thickness in the plane of x and y, bending in z.
 
     Parameters
     ----------
     length, width, thickness : float
-        Along x, y and z, m.
+        Dimensions along x, y and z, m.
     youngs_modulus, density, poisson : float
-        N/m^2, kg/m^3, 1.
+        Young's modulus, N/m^2, density, kg/m^3, and Poisson's ratio.
     elements : pair of int or sequence of float
-        Along x and y a number of equal elements, or the lines between them: distances from the first edge, 0 and the
+        Numbers of equal elements along x and y, or the lines between them: distances from the first edge, 0 and the
         last edge included, m. An element has 5 x 5 equally spaced nodes.
     edges : tuple of {"free", "supported", "clamped"}
-        At the smallest and the largest x, then at the smallest and the largest y. Supported: no deflection, and no
-        rotation of the section along the edge.
+        Boundary conditions at the smallest and the largest x, then at the smallest and the largest y. Supported: no
+        deflection, and no rotation of the section along the edge.
     origin : array_like, shape (3,)
         Corner of the smallest x and y, m.
     points : mapping of str to array_like, shape (2,), optional
-        Named places x, y between nodes, m: motions there are shown as ``"name:z"``, interpolated by the elements.
+        Named points x, y between nodes, m: their motions are ``"name:z"``, interpolated by the elements.
     regions : mapping of str to PlateRegion, optional
         Lines and faces on which joints act per length or area; ``"name:z"`` is the end of a joint.
     loss_factor : float
-        Structural damping, K (1 + i eta): twice the damping ratio of each mode. `with_modal_damping` sets others.
+        Loss factor eta of structural damping, K (1 + i eta), twice the damping ratio of each mode. Use
+        `with_modal_damping` for other ratios.
 
     Returns
     -------
     PointModel
-        DOFs ``"node:z"``, ``"node:theta_x"``, ``"node:theta_y"``; nodes count from 1 along x, then y.
+        Plate with DOFs ``"node:z"``, ``"node:theta_x"``, ``"node:theta_y"``; nodes count from 1 along x, then y.
 
     Raises
     ------
     ValueError
         A dimension that is not positive, an unknown edge, lines that do not ascend, a place outside the plate.
+
+    See Also
+    --------
+    beam : beams.
+    add_regions : lines and faces of other models.
 
     Notes
     -----
@@ -165,12 +171,12 @@ class _Axis:
     Parameters
     ----------
     lines : ndarray, shape (n + 1,)
-        Between the elements, m.
+        Positions of the lines between the elements, m.
 
     Attributes
     ----------
     nodes : ndarray
-        m.
+        Positions of the nodes, m.
     mass, slope, stiffness : sparse array
         Integrals of N N, N' N and N' N'.
     """
@@ -187,7 +193,7 @@ class _Axis:
         )
 
     def _assembled(self, element: FloatArray, power: int) -> sparse.csr_array:
-        """Return the sum of an element's matrix times this power of its length."""
+        """Return the sum of an element's matrix multiplied by this power of its length."""
         first = _DEGREE * np.arange(self.lines.size - 1)
         rows, columns = (first[:, None, None] + np.arange(_DEGREE + 1).reshape(s) for s in ((1, -1, 1), (1, 1, -1)))
         values = np.diff(self.lines)[:, None, None] ** power * element
@@ -195,7 +201,7 @@ class _Axis:
         return sparse.csr_array(sparse.coo_array(entries, shape=(self.nodes.size,) * 2))
 
     def between(self, low: float, high: float) -> tuple[FloatArray, FloatArray]:
-        """Return points and weights that integrate polynomials of the 15th degree in each element; one where equal."""
+        """Return points and weights that integrate polynomials of the 15th degree in each element; one if equal."""
         if low == high:
             return np.array([low]), np.ones(1)
         inner = self.lines[(self.lines > low) & (self.lines < high)]
@@ -264,20 +270,20 @@ def _lines(name: str, given: int | Sequence[float], length: float) -> FloatArray
 
 
 def _free(nx: int, ny: int, edges: Sequence[Edge]) -> NDArray[np.intp]:
-    """Return the DOFs that no edge holds, counted from 0."""
-    held = np.zeros((ny, nx, 3), bool)
-    views = (held[:, 0], held[:, -1], held[0], held[-1])
+    """Return the DOFs that no edge fixes, counted from 0."""
+    fixed = np.zeros((ny, nx, 3), bool)
+    views = (fixed[:, 0], fixed[:, -1], fixed[0], fixed[-1])
     for edge, own, along in zip(edges, views, (1, 1, 2, 2), strict=True):
         own[:, 0] |= edge != "free"
         own[:, along] |= edge != "free"
         own[:, 3 - along] |= edge == "clamped"
-    if held.all():
+    if fixed.all():
         raise ValueError("the edges fix every node; give more elements, or free edges")
-    return np.flatnonzero(~held.ravel())
+    return np.flatnonzero(~fixed.ravel())
 
 
 def _named(what: str, given: Mapping[str, Any] | None, taken: Collection[str]) -> dict[str, Any]:
-    """Return a mapping by names that no node has."""
+    """Return a mapping whose names belong to no node."""
     check_type(what, {} if given is None else given, Mapping)
     for name in given or ():
         if not isinstance(name, str) or not name or name in taken or any(sign in name for sign in ":/~@ "):
@@ -300,6 +306,6 @@ def _spots(
 
 
 def _motions(rows: FloatArray, free: NDArray[np.intp]) -> dict[str, sparse.csr_array]:
-    """Return motions by direction from the DOFs that are free, of weights of all nodes."""
+    """Return motions by direction from the free DOFs, from weights of all nodes."""
     whole = (sparse.csr_array(sparse.kron(sparse.csr_array(rows), np.eye(3)[[i]])) for i in range(3))
     return {move: one[:, free] for move, one in zip(_MOVES, whole, strict=True)}

@@ -1,4 +1,4 @@
-"""Models whose nodes have places, and reference points that patches of nodes follow or whose mean motion they show."""
+"""Models whose nodes have places, and reference points that patches of nodes follow or whose mean motion they are."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from jointfrf.models.model import Model
 __all__ = ["Coupling", "PointModel", "PointPatch", "Region", "couple_points", "rigid_body"]
 
 Coupling = Literal["rigid", "distributing"]
-#: A motion is not held by a patch where its nodes see less than this share of the motion that they see most of.
+#: Relative motion of the nodes of a patch below which it does not determine a motion of its point.
 _HELD = 1e-6
-#: Two regions are of one size where their meshes differ by no more than this share.
+#: Relative difference of the sizes of two regions, by their meshes, up to which they are equal.
 _SAME_SIZE = 0.01
 
 
@@ -29,15 +29,15 @@ class Region(NamedTuple):
     Attributes
     ----------
     per : {"m", "m^2"}
-        Whether it is a line or a face.
+        Unit: "m" for a line, "m^2" for a face.
     size : float
-        Its length, m, or area, m^2.
+        Length, m, or area, m^2.
     centre : ndarray, shape (3,)
-        m.
+        Centre, m.
     terms : int
-        How many polynomials describe the motion there.
+        Number of polynomials of the motion.
     extent : ndarray, shape (3,)
-        Along the axes, m.
+        Extent along the axes, m.
     """
 
     per: Literal["m", "m^2"]
@@ -52,7 +52,7 @@ class Region(NamedTuple):
         )
 
     def matches(self, other: Region) -> bool:
-        """Whether both describe motions of lines or faces of one size by the same polynomials."""
+        """Return whether both have the same kind, size and polynomials."""
         is_alike = self.per == other.per and self.terms == other.terms
         return is_alike and bool(np.isclose(self.size, other.size, rtol=_SAME_SIZE))
 
@@ -63,12 +63,12 @@ class Region(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class PointModel(Model):
-    """A model some of whose motions are no DOFs but sums of them; where its nodes are.
+    """A model with motions that are sums of DOFs, and with places of its nodes.
 
     Attributes
     ----------
     places : mapping of str to ndarray, shape (3,)
-        Nodes and reference points, m.
+        Positions of nodes and reference points, m.
     shown : mapping of str to sparse array, shape (1, n)
         Motions that are no DOFs, by names like DOFs, ``"tip:theta_x"``: weights of the DOFs.
     regions : mapping of str to Region
@@ -87,12 +87,12 @@ class PointModel(Model):
         return found if set(found) <= self.shown.keys() else ()
 
     def ports(self, *names: str) -> list[int] | sparse.csr_array:
-        """Return DOFs, or weights where a motion is shown that is none, as `jointfrf.receptance` takes them.
+        """Return DOFs, or weights for motions in `shown`, as argument of `jointfrf.receptance`.
 
         Raises
         ------
         ValueError
-            There is nothing of this name.
+            The model has no motion of this name.
         """
         if not any(name in self.shown for name in names):
             return super().ports(*names)
@@ -109,29 +109,35 @@ def rigid_body(
     centre: ArrayLike = (0.0, 0.0, 0.0),
     moves: Sequence[str] = DIRECTIONS,
 ) -> PointModel:
-    """Model of a rigid body with named points.
+    """Return a model of a rigid body with named points.
 
     Parameters
     ----------
     mass : float
-        kg.
+        Mass, kg.
     inertia : array_like, shape (3,) or (3, 3)
-        About its centre of mass: moments about axes along x, y, z, or the tensor, kg m^2.
+        Moments of inertia about axes through the centre of mass along x, y, z, or the tensor, kg m^2.
     points : mapping of str to array_like, shape (3,)
-        Where they are, m; each has six DOFs, ``"foot:x"`` to ``"foot:theta_z"``.
+        Positions of the points, m; each has six DOFs, ``"foot:x"`` to ``"foot:theta_z"``.
     centre : array_like, shape (3,)
-        Its centre of mass, m; its DOFs are ``"centre:x"``, ...
+        Centre of mass, m; its DOFs are ``"centre:x"``, ...
     moves : sequence of str
-        Directions in which it is free, among x, y, z, theta_x, theta_y, theta_z; rails hold it in the others.
+        Directions in which it is free, among x, y, z, theta_x, theta_y, theta_z; all further directions are fixed.
 
     Returns
     -------
     PointModel
+        Rigid body.
 
     Raises
     ------
     ValueError
-        A mass or an inertia that is not positive, a point named ``centre``, a direction that there is not.
+        A mass or an inertia that is not positive, a point named ``centre``, a direction that does not exist.
+
+    See Also
+    --------
+    chain : chains of masses and springs.
+    Substructure : a part of an assembly.
 
     Examples
     --------
@@ -178,13 +184,14 @@ class PointPatch:
     Attributes
     ----------
     name : str
-        Of the point; its DOFs are ``"name:x"`` to ``"name:theta_z"``.
+        Name of the point; its DOFs are ``"name:x"`` to ``"name:theta_z"``.
     nodes : tuple of str
+        Nodes of the patch.
     coupling : {"rigid", "distributing"}
-        The nodes follow the point as a rigid body (RBE2, ``*RIGID BODY``), or the point shows their mean motion and
-        spreads forces over them (RBE3, distributing ``*COUPLING``), which adds no stiffness.
+        Coupling: the nodes follow the point as a rigid body (RBE2, ``*RIGID BODY``), or the point has their mean motion
+        and distributes forces over them (RBE3, distributing ``*COUPLING``), which adds no stiffness.
     at : ndarray, shape (3,), or None
-        The point, m; the mean place of the nodes by default.
+        Position of the point, m; by default the mean of its nodes.
     """
 
     name: str
@@ -203,29 +210,30 @@ class _Followers:
 
 
 def couple_points(model: PointModel, patches: Sequence[PointPatch]) -> PointModel:
-    """Add reference points to a model.
+    """Return a model with additional reference points.
 
     Parameters
     ----------
     model : PointModel
-        With the places of the nodes of the patches.
+        Model with the places of the nodes of the patches.
     patches : sequence of PointPatch
+        Nodes of each point.
 
     Returns
     -------
     PointModel
-        DOFs of nodes that follow a rigid patch are DOFs of its point; they are still shown by their names. Points of
-        distributing patches are shown.
+        Model in which DOFs of a rigid patch are replaced by DOFs of its point; `shown` still has their names, and the
+        points of distributing patches.
 
     Raises
     ------
     ValueError
-        A node without place or DOFs; a node in two rigid patches; a patch that does not hold its point.
+        A node without place or DOFs; a node in two rigid patches; a patch that does not determine its point.
 
     Notes
     -----
-    Rigid: u = T q with u_i = u_R + theta x r_i. Distributing: q_R = (R^T R)^-1 R^T u, the rigid motion nearest to that
-    of the nodes; forces at the point are spread by its transpose.
+    Rigid: u = T q with u_i = u_R + theta x r_i. Distributing: q_R = (R^T R)^-1 R^T u is the rigid motion nearest to the
+    motion of the nodes; the transpose distributes forces at the point.
     """
     number = {dof: i for i, dof in enumerate(model.dofs)}
     taken = {name.partition(":")[0] for name in (*model.dofs, *model.shown)}
@@ -263,7 +271,7 @@ def couple_points(model: PointModel, patches: Sequence[PointPatch]) -> PointMode
 
 
 def _followers(model: PointModel, number: Mapping[str, int], patch: PointPatch) -> _Followers:
-    """Return the DOFs of the nodes of a patch, and how they move with its point."""
+    """Return the DOFs of the nodes of a patch, and their motion for a motion of its point."""
     if not patch.nodes:
         raise ValueError(f"point {patch.name}: it has no nodes")
     missing = [node for node in patch.nodes if node not in model.places]
@@ -277,12 +285,12 @@ def _followers(model: PointModel, number: Mapping[str, int], patch: PointPatch) 
     turning = patch.coupling == "rigid" or len(patch.nodes) < 3
     for i, node in enumerate(patch.nodes):
         names = [f"{node}:{direction}" for direction in DIRECTIONS]
-        held = [name for name in names[:3] if name not in number]
-        if held:
-            why = "it is held or belongs to another constraint of the file"
+        absent = [name for name in names[:3] if name not in number]
+        if absent:
+            why = "it is fixed or belongs to another constraint of the file"
             if any(f"{node}:local_{direction}" in number for direction in DIRECTIONS[:3]):
                 why = "its directions are local; write the model in global ones"
-            raise ValueError(f"point {patch.name}: node {node} has no DOF {held[0]}: {why}")
+            raise ValueError(f"point {patch.name}: node {node} has no DOF {absent[0]}: {why}")
         dofs += [number[name] for name in names[:3]]
         rows += list(motion[i])
         for axis in range(3):
@@ -290,7 +298,7 @@ def _followers(model: PointModel, number: Mapping[str, int], patch: PointPatch) 
                 dofs.append(number[names[3 + axis]])
                 rows.append(np.eye(6)[3 + axis])
     whole = np.array(rows)
-    # Rotations times the size of the patch are displacements like the others.
+    # Rotations times the size of the patch are displacements, too.
     size = max(float(np.ptp(where, axis=0).max()), 1e-12)
     seen = np.linalg.svd(whole * np.r_[np.ones(3), np.full(3, 1 / size)], compute_uv=False)
     if len(whole) < 6 or seen[-1] <= _HELD * seen[0]:

@@ -34,40 +34,40 @@ __all__ = ["ReceptanceInfo", "ReceptanceMethod", "receptance"]
 Direct = Literal["dense", "banded", "sparse"]
 ReceptanceMethod = Literal["auto", "dense", "banded", "sparse", "modal", "krylov"]
 
-#: A matrix with a wider band than this share of its size is solved as a dense one.
+#: Share of the size of a matrix above which a band is solved as a full matrix.
 _BAND_LIMIT = 0.25
-#: Up to this size a model is solved as a dense one, whatever its structure.
+#: Size up to which a model is solved as a full matrix, for any structure.
 _TINY = 8
-#: Up to this band, or this size, a direct solution of many lines side by side is as fast as any reduction.
+#: Band, or size, up to which a direct solution of many lines side by side is as fast as any reduction.
 _NARROW, _SMALL = 64, 64
-#: Beyond this size all modes cost more than a reduced model.
+#: Size above which all modes cost more than a reduced model.
 _ALL_MODES = 600
-#: A reduction pays for itself from this number of lines on, and up to this number of DOFs requested.
+#: Number of lines from which on, and number of requested DOFs up to which a reduction is faster.
 _MANY_LINES, _FEW_DOFS = 32, 64
-#: Larger models with fewer entries than this share of a full matrix are factored by their entries.
+#: Share of entries of a full matrix below which larger models are factored as sparse matrices.
 _SPARSE = 0.1
-#: Lines at which a sum of all modes is compared with a direct solution.
+#: Number of lines at which a sum of all modes is compared with a direct solution.
 _SPOTS = 3
 
 
 class ReceptanceInfo(NamedTuple):
-    """How receptances were calculated.
+    """Method, error estimate and solver of calculated receptances.
 
     Parameters
     ----------
     method : {"dense", "banded", "sparse", "modal", "krylov"}
-        The method used.
+        Method that was used.
     reason : str
-        Why it was chosen, in a sentence.
+        Reason of the choice, in a sentence.
     error_estimate : float or None
-        Of "modal" and "krylov": largest difference to a direct solution at a few lines, relative to the largest entry
-        of the line. None for a direct solution.
+        Error of "modal" and "krylov": largest difference to a direct solution at a few lines, relative to the largest
+        entry of the line. None for a direct solution.
     tolerance : float or None
-        What the estimate had to meet, unless rounding keeps a direct solution from it, too.
+        Upper limit of the estimate, unless rounding keeps a direct solution from it, too.
     n_vectors : int or None
-        Modes, or vectors of the reduced model.
+        Number of modes, or of vectors of the reduced model.
     solver : str or None
-        What factored sparse matrices, of "sparse" and "krylov": the library and the order of elimination.
+        Library and order of elimination of factored sparse matrices, for "sparse" and "krylov".
     checked_hz : tuple of float
         Lines of the error estimate, Hz: between them the error is not bounded.
     """
@@ -152,52 +152,54 @@ def receptance(
     tolerance: float = 1e-8,
     full_output: bool = False,
 ) -> ComplexArray | tuple[ComplexArray, ReceptanceInfo]:
-    """Receptance ((1 + i eta) K + i H + i w C - w^2 M)^-1 at chosen DOFs.
+    """Return the receptance ((1 + i eta) K + i H + i w C - w^2 M)^-1 at chosen DOFs.
 
     Parameters
     ----------
     freq_hz : array_like, shape (n_freq,)
-        Frequencies in Hz.
+        Frequencies, Hz.
     stiffness, mass : array_like or scipy sparse array, shape (n, n)
-        K in N/m, M in kg.
+        Stiffness K, N/m, and mass M, kg.
     damping : array_like or sparse array, shape (n, n), optional
-        Viscous damping C, N s/m.
+        Viscous damping C, N s/m; none by default.
     loss_factor : float
-        eta of the whole stiffness.
+        Loss factor eta of the whole stiffness, default 0.
     structural_damping : array_like or sparse array, shape (n, n), optional
-        Structural damping H, N/m.
+        Structural damping H, N/m; none by default.
     outputs, inputs : array_like of int, or of shape (m, n), optional
         DOFs of responses and of forces, counted from 0; all by default. Or weights of all DOFs for each response or
         force, an array or sparse array: a mean, a difference, a point between nodes.
     method : {"auto", "dense", "banded", "sparse", "modal", "krylov"}
-        "dense": full matrices solved on every line. "banded": the same in band storage. "sparse": a sparse
-        factorisation of every line. All three take any damping.
-        "modal": all modes once, then their sum; for symmetric K and M and damping that the undamped modes diagonalise.
-        "krylov": the model is reduced to solutions at a few frequencies; for symmetric K and M, damping a M + b K and
-        one loss factor. Where `tolerance` is not met, the model is solved and a warning says so. "auto" chooses, see
-        Notes.
+        Method, default "auto", see Notes:
+
+        - "dense": full matrices solved on every line, with any damping
+        - "banded": the same in band storage
+        - "sparse": a sparse factorisation of every line, with any damping
+        - "modal": the sum of all modes; for symmetric K and M and damping that the undamped modes diagonalise
+        - "krylov": the model is reduced to solutions at a few frequencies; for symmetric K and M, damping a M + b K and
+          one loss factor. If `tolerance` is not met, the model is solved with a warning
     on_singular : {"raise", "nan"}
-        Whether a bad line raises or becomes NaN.
+        Whether a singular line raises an error (default) or becomes NaN.
     out : ndarray of complex128, shape (n_freq, n_out, n_in), optional
-        Where the result goes, as in `invert`.
+        Array for the result, see `invert`.
     tolerance : float
-        What the error estimate of "krylov", and of "modal" where "auto" chose it, must meet: the largest error of a
-        line relative to its largest entry. Where rounding limits a direct solution, too, 30 times its rounding
-        suffices, up to 2.2e-4: what rounding leaves at the reciprocal condition `jointfrf.RCOND_LIMIT`.
+        Upper limit of the error estimate of "krylov", and of "modal" if "auto" chose it: the largest error of a line
+        relative to its largest entry. If rounding limits a direct solution, too, 30 times its rounding is sufficient,
+        up to 2.2e-4, which is the rounding at the reciprocal condition `jointfrf.RCOND_LIMIT`.
     full_output : bool
-        Whether a `ReceptanceInfo` is returned too: what was done, why, and the error estimate.
+        Whether to return a `ReceptanceInfo` as well, with method, reason and error estimate; default False.
 
     Returns
     -------
     h : ndarray, shape (n_freq, n_out, n_in)
-        m/N (rotational rows rad/N, rotational columns m/(N m)).
+        Receptance, m/N (rotational rows rad/N, rotational columns m/(N m)).
     info : ReceptanceInfo
-        Only with `full_output`.
+        Method and error, only with `full_output`.
 
     Raises
     ------
     SingularLineError
-        A line hits an undamped natural frequency, or 0 Hz of a free structure.
+        A line is at an undamped natural frequency, or at 0 Hz of a free structure.
     ValueError
         Wrong shapes or DOFs, NaN or Inf; "modal" or "krylov" with damping that couples the modes.
 
@@ -206,26 +208,31 @@ def receptance(
     ConvergenceWarning
         "krylov" did not meet the tolerance; the model was solved instead.
     IllConditionedWarning
-        A line is singular to working precision; or rounding of the entries of K changes the motion of a structure that
-        is softly held, as a rigid body, by more than 2.2e-4 of it.
+        A line is singular to working precision; or rounding of the entries of K changes the rigid-body motion of a
+        structure on soft springs by more than 2.2e-4 of it.
+
+    See Also
+    --------
+    Model.receptance : the same by names of DOFs.
+    couple : receptance of an assembly.
 
     Notes
     -----
     Eqs. (2.28), (2.29), with i w C for viscous damping. Cost a line: n^3 (dense), n b^2 (band of b diagonals),
     n_vectors n_out n_in (modal, krylov); about n^1.5 for a sparse solution of a solid.
 
-    "auto" solves in band storage where the band is narrow, and full matrices where the model is small. Many lines of a
-    larger symmetric model with damping a M + b K and one loss factor are a sum of modes, all of them or those of a
-    reduced model. That sum is compared with direct solutions at a few lines: at both ends, and of a reduced model where
-    its residual is largest. Motions as a rigid body are treated apart before, by their mass alone: near 0 Hz rounding
-    hides them from any solution of a structure that is not held. A motion counts as free if what K holds it with is
-    within 32 roundings of the terms it is the difference of. Where the tolerance is not met, the model is solved.
-    The error between these lines is estimated, not bounded. Any other damping is solved, and so is a model of many DOFs
-    and few entries, by a sparse factorisation.
+    "auto" uses band storage if the band is narrow, and full matrices if the model is small. For many lines of a larger
+    symmetric model with damping a M + b K and one loss factor it sums modes, all of them or the modes of a reduced
+    model. This sum is compared with direct solutions at a few lines: at both ends, and for a reduced model at the
+    largest residual. If the tolerance is not met, the model is solved. The error between these lines is estimated, not
+    bounded. A model with any other damping is solved, by a sparse factorisation if it has many DOFs and few entries.
 
-    Sparse matrices are factored by SuperLU, from 4 000 DOFs on in an order by nested dissection: that of METIS where
-    the package pymetis is installed. From 20 000 DOFs on symmetric ones are factored by PARDISO (package pypardiso,
-    real matrices, which is what a reduction needs) or MUMPS (package python-mumps) where they are installed.
+    Rigid-body motions are first separated and enter by their mass alone, because near 0 Hz rounding hides them from any
+    solution of a free structure. A motion is free if its stiffness in K is within 32 roundings of its terms.
+
+    SuperLU factors sparse matrices, from 4 000 DOFs on in an order by nested dissection, by METIS if the package
+    pymetis is installed. From 20 000 DOFs on PARDISO (package pypardiso) factors real symmetric matrices, which a
+    reduction needs, or MUMPS (package python-mumps) factors symmetric ones, if they are installed.
     `ReceptanceInfo.solver` names library and order.
 
     Examples
@@ -261,7 +268,7 @@ def receptance(
 
 
 def _direct(matrices: ModelMatrices) -> Direct:
-    """How a model is solved best on every line."""
+    """Return the best direct method for every line of a model."""
     if matrices.n <= _TINY:
         return "dense"
     n, widths = matrices.n, matrices.widths
@@ -273,7 +280,7 @@ def _direct(matrices: ModelMatrices) -> Direct:
 
 
 def _automatic(task: _Task) -> tuple[ComplexArray, ReceptanceInfo]:
-    """Choose by size, band, damping and number of lines."""
+    """Return the receptance by a method chosen by size, band, damping and number of lines."""
     matrices, n = task.matrices, task.matrices.n
     if n <= _TINY:
         return _solved(task, "dense", f"small model: {n} DOFs")
@@ -298,7 +305,7 @@ def _automatic(task: _Task) -> tuple[ComplexArray, ReceptanceInfo]:
 
 
 def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
-    """Direct solution."""
+    """Return a direct solution."""
     freq, to, into = task.freq_hz, task.outputs, task.inputs
     solver, weighted = None, to.picked is None or into.picked is None
     if how == "sparse":
@@ -308,7 +315,7 @@ def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, Recept
     else:
         result, status = _solve_stored(task, to.needed, into.needed, how)
     if status.lowest_rcond < RCOND_LIMIT:
-        status = _judged(task.matrices, freq, status)
+        status = _checked_status(task.matrices, freq, status)
         result[status.line_info > 0] = np.nan
         check_lines("receptance", status, {}, freq, task.on_singular, RCOND_LIMIT)
     if how != "sparse" and weighted:
@@ -329,7 +336,7 @@ def _solve_stored(
     kl, ku = matrices.widths if how == "banded" else (0, 0)
 
     def stored(name: str) -> FloatArray | None:
-        """Return a matrix, or its band as LAPACK stores it, transposed: row j holds column j."""
+        """Return a matrix, or its band as LAPACK stores it, transposed: row j contains column j."""
         if how == "dense" or matrices.named[name] is None:
             return matrices.dense(name)
         entries = sparse.coo_array(matrices.named[name])
@@ -385,12 +392,12 @@ def _reciprocal_condition(z: sparse.csc_matrix, factors: Factors) -> float:
     return 1 / size if size > 0 else 0.0
 
 
-def _judged(matrices: ModelMatrices, freq: FloatArray, status: LineStatus) -> LineStatus:
-    """Return the status of lines: singular where nothing holds the structure, and what condition is unreliable.
+def _checked_status(matrices: ModelMatrices, freq: FloatArray, status: LineStatus) -> LineStatus:
+    """Return the status of lines: singular if the structure is free, or with an unreliable condition.
 
-    Rounding decides whether elimination of a singular matrix meets a zero: rigid motions that nothing resists say it.
-    A fine mesh in mixed units has rcond 1e-13 and still gives nine digits: such a line is unreliable if it is singular
-    to working precision, or if rounding of K hides what holds the structure as a whole.
+    Rounding decides whether elimination of a singular matrix meets a zero; rigid motions without stiffness show it. A
+    fine mesh in mixed units has rcond 1e-13 and still gives nine digits: such a line is unreliable if it is singular
+    to working precision, or if rounding of K hides the stiffness against rigid-body motion.
     """
     rcond, info = np.where(status.rcond < SINGULAR, status.rcond, 1.0), status.line_info.copy()
     poor = status.rcond < RCOND_LIMIT
@@ -403,7 +410,7 @@ def _judged(matrices: ModelMatrices, freq: FloatArray, status: LineStatus) -> Li
 
 
 def _fallen_back(task: _Task, error: float, n_vectors: int, what: str) -> tuple[ComplexArray, ReceptanceInfo]:
-    """Direct solution after a sum of modes that was not good enough."""
+    """Return a direct solution after a sum of modes that was not accurate enough."""
     reason = (
         f"{what} of {n_vectors} vectors has the error estimate {error:.1e}, above the tolerance {task.tolerance:.1e}"
     )
@@ -411,7 +418,7 @@ def _fallen_back(task: _Task, error: float, n_vectors: int, what: str) -> tuple[
 
 
 def _summed(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
-    """All modes, where they meet the tolerance."""
+    """Return the sum of all modes if it meets the tolerance."""
     try:
         modes, rigid = all_modes(task.matrices, task.outputs, task.inputs)
     except ValueError as cause:
@@ -424,7 +431,7 @@ def _summed(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
 
 
 def _reduced(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
-    """Reduced model, where it meets the tolerance."""
+    """Return the solution by a reduced model if it meets the tolerance."""
     if task.is_empty:
         return _solved(task, _direct(task.matrices), "no lines, or no DOFs with a weight")
     found = reduce_model(task.freq_hz, task.matrices, task.outputs, task.inputs, task.tolerance)
@@ -442,7 +449,7 @@ def _finished(
     method: Literal["modal", "krylov"],
     reason: str,
 ) -> tuple[ComplexArray, ReceptanceInfo]:
-    """Sum of modes, or a direct solution where its error, found at some lines, is too large."""
+    """Return a sum of modes, or a direct solution if its error at some lines is too large."""
     n_vectors, (error, checked_hz) = modes.stiffness.size, found
     if not error <= max(task.tolerance, attainable):
         return _fallen_back(task, error, n_vectors, "a sum of modes" if method == "modal" else "a reduced model")

@@ -18,13 +18,13 @@ from jointfrf.models.points import PointModel, Region
 
 __all__ = ["Degree", "NodeRegion", "Quadrature", "add_regions", "region_rows"]
 
-#: Polynomials of the motion: of this total degree, or of these degrees along both directions of a face.
+#: Degree of the polynomials of the motion: total degree, or degrees along both directions of a face.
 Degree = int | tuple[int, int]
-#: Total degrees by default, of a line and of a face.
+#: Default total degrees of a line and of a face.
 _DEGREES = {1: 6, 2: 4}
-#: A region is straight, or plane, whose points leave the line, or the plane, by no more than this share of its size.
+#: Largest distance of the points of a straight or plane region from the line or plane, as a share of its size.
 _FLAT = 1e-3
-#: Motions are independent polynomials whose part that is new exceeds this share.
+#: Least new part of a polynomial of the motion that is independent.
 _NEW = 1e-8
 
 
@@ -35,7 +35,7 @@ class Quadrature:
     Attributes
     ----------
     at : ndarray, shape (m, 3)
-        m.
+        Positions of the points, m.
     weights : ndarray, shape (m,)
         Lengths in m, or areas in m^2.
     rows : mapping of str to sparse array, shape (m, n)
@@ -56,11 +56,16 @@ class NodeRegion:
     name : str
         Name of the region; ``"name:z"`` is the end of a joint.
     nodes : sequence of str
+        Names of the nodes.
     degree : int or (int, int), optional
-        Total degree of the polynomials that describe the motion, 6 of a line and 4 of a face by default; or the degrees
+        Total degree of the polynomials that describe the motion, default 6 for a line and 4 for a face; or the degrees
         along both directions of a face, in the order of its axes.
     size : float, optional
-        Length, m, or area, m^2; that between the nodes, of a face their convex hull, by default.
+        Length, m, or area, m^2; by default the distance between the outer nodes, for a face their convex hull.
+
+    See Also
+    --------
+    add_regions : a model with regions.
 
     Examples
     --------
@@ -80,18 +85,19 @@ class NodeRegion:
 
 
 def add_regions(model: PointModel, regions: Sequence[NodeRegion]) -> PointModel:
-    """Add regions to a model.
+    """Return a model with regions.
 
     Parameters
     ----------
     model : PointModel
-        With the places of the nodes.
+        Model with the places of the nodes.
     regions : sequence of NodeRegion
+        Regions to add.
 
     Returns
     -------
     PointModel
-        The same with `regions`, on which joints act per length or area.
+        The model with `regions`, on which joints act per length or area.
 
     Raises
     ------
@@ -100,6 +106,11 @@ def add_regions(model: PointModel, regions: Sequence[NodeRegion]) -> PointModel:
         taken.
     TypeError
         `model` is no PointModel, or `regions` are no regions.
+
+    See Also
+    --------
+    NodeRegion : nodes of a region.
+    PlacedJoint : a joint on regions.
 
     Notes
     -----
@@ -159,12 +170,16 @@ def region_rows(name: str, own: Quadrature, degree: Degree | None) -> tuple[Regi
     Parameters
     ----------
     name : str
+        Name of the region.
     own : Quadrature
+        Points and weights.
     degree : int or (int, int), optional
+        Degree of the polynomials of the motion.
 
     Returns
     -------
     Region
+        The region.
     dict of str to sparse array, shape (1, n)
         Coefficients a_i of the motion u = sum a_i p_i by the names of `Region.ports`.
 
@@ -212,7 +227,7 @@ def _powers(name: str, dimension: int, degree: Degree | None) -> NDArray[np.intp
 
 
 def _local(name: str, at: FloatArray) -> FloatArray:
-    """Return coordinates along a line, shape (m, 1), or in a plane, shape (m, 2): those of the axes it leaves least."""
+    """Return coordinates along a line, shape (m, 1), or in a plane, shape (m, 2), along the nearest axes."""
     centred = at - at.mean(axis=0)
     _, length, axes = np.linalg.svd(centred, full_matrices=False)
     length = np.r_[length, np.zeros(3 - length.size)]
@@ -227,7 +242,7 @@ def _local(name: str, at: FloatArray) -> FloatArray:
 
 
 def _weights(name: str, at: FloatArray) -> FloatArray:
-    """Return lengths or areas that belong to nodes."""
+    """Return the length or area of each node."""
     local = _local(name, at)
     if local.shape[1] == 1:
         order = np.argsort(local[:, 0], kind="stable")

@@ -19,22 +19,23 @@ __all__ = ["Lines", "lines_of"]
 
 @dataclass(frozen=True, kw_only=True)
 class Lines(ABC):
-    """An array whose first axis is that of the lines, as a task is sent it.
+    """An array over lines, in the form that is sent to a task.
 
     Attributes
     ----------
     shape : tuple of int
+        Shape, lines first.
     place : Path or None
-        The file that contains it; None in memory.
+        File that contains the array; None in memory.
     """
 
     shape: tuple[int, ...]
     place: Path | None = None
-    #: Whether tasks write their results themselves; otherwise they are sent back.
+    #: Whether tasks write their results themselves; otherwise they send them back.
     is_written_by_tasks: ClassVar[bool] = False
 
     def of(self, lines: slice) -> Lines:
-        """Return what a task that needs these lines is sent."""
+        """Return the object to send to a task that needs these lines."""
         return self
 
     @abstractmethod
@@ -58,12 +59,12 @@ class MemoryLines(Lines):
         return MemoryLines(shape=self.shape, array=np.asarray(self.array[lines]), first=lines.start)
 
     def read(self, lines: slice) -> NDArray[Any]:
-        """Return lines that the task was sent."""
+        """Return lines that were sent to the task."""
         found: NDArray[Any] = self.array[lines.start - self.first : lines.stop - self.first]
         return found
 
     def write(self, lines: slice, values: NDArray[Any]) -> None:
-        """Write lines, where the array is."""
+        """Write lines into the array."""
         self.array[lines] = values
 
 
@@ -77,7 +78,7 @@ class MappedLines(Lines):
     is_written_by_tasks: ClassVar[bool] = True
 
     def _start(self, lines: slice) -> int:
-        """Return where lines begin in the file, bytes."""
+        """Return the position of the lines in the file, bytes."""
         return self.offset + int(lines.start) * np.dtype(self.dtype).itemsize * math.prod(self.shape[1:])
 
     def read(self, lines: slice) -> NDArray[Any]:
@@ -86,7 +87,7 @@ class MappedLines(Lines):
         return np.memmap(self.place, self.dtype, "r", self._start(lines), shape)
 
     def write(self, lines: slice, values: NDArray[Any]) -> None:
-        """Write lines into the file and close it: then other machines see them, unlike what is written into a map."""
+        """Write lines into the file and close it: other machines can then read them, unlike data written into a map."""
         with self.place.open("r+b") as file:
             file.seek(self._start(lines))
             np.ascontiguousarray(values, self.dtype).tofile(file)
@@ -106,15 +107,16 @@ class Hdf5Lines(Lines):
 
 
 def lines_of(name: str, array: ArrayLike, *, is_result: bool = False) -> Lines:
-    """Find out what an array is, and how tasks read its lines.
+    """Return an array in the form in which tasks read its lines.
 
     Parameters
     ----------
     name : str
-        Of the argument, for messages.
+        Name of the argument, for messages.
     array : array_like, numpy.memmap or h5py.Dataset
+        Array over lines.
     is_result : bool
-        Whether results are written into it.
+        Whether results are written into it, default False.
 
     Raises
     ------
@@ -136,7 +138,7 @@ def lines_of(name: str, array: ArrayLike, *, is_result: bool = False) -> Lines:
 
 def _numpy(name: str, array: ArrayLike) -> Lines:
     if isinstance(array, np.memmap) and array.filename is not None and array.flags.c_contiguous and array.mode != "c":
-        # A view of the mapped array lies further on in the file.
+        # A view of the mapped array has a later position in the file.
         root: Any = array
         while isinstance(root.base, np.ndarray):
             root = root.base
@@ -150,6 +152,6 @@ def _numpy(name: str, array: ArrayLike) -> Lines:
 
 def _hdf5(array: Any, is_result: bool) -> Lines:
     if is_result or array.file.mode != "r":
-        return MemoryLines(shape=array.shape, array=array)  # HDF5 files have one writer and, with it, no readers
+        return MemoryLines(shape=array.shape, array=array)  # an HDF5 file with a writer cannot have readers
     place = Path(array.file.filename).resolve()
     return Hdf5Lines(shape=tuple(array.shape), place=place, dataset=str(array.name))

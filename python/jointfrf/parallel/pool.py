@@ -1,4 +1,4 @@
-"""Tasks on any executor of `concurrent.futures`, a few at a time, results as they come; processes and threads."""
+"""Tasks on any executor of `concurrent.futures`, a few at a time, with results on arrival; processes and threads."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ __all__ = [
     "started_processes",
 ]
 
-#: With it Python does not look for modules in the working directory.
+#: Variable with which Python does not search modules in the working directory.
 _SAFE = "PYTHONSAFEPATH"
-#: Held by the thread that changes the environment.
+#: Lock of the thread that changes the environment.
 _CHANGING = RLock()
-#: Held by the thread that changes the numbers of threads; tasks of this process at work, and the numbers before them.
+#: Lock of the thread that changes the numbers of threads; running tasks of this process; the earlier numbers.
 _lock = Lock()
 _at_work = 0
 _before: list[tuple[Any, int]] = []
@@ -48,9 +48,9 @@ def available_cores() -> int:
 
 
 def can_start_processes() -> bool:
-    """Whether another Python can be started: not from a program that Python is part of, whose name says nothing of it.
+    """Return whether another Python can be started: not from a host program, whose name is not a Python.
 
-    Who calls `multiprocessing.set_executable` has said which Python to start.
+    A caller of `multiprocessing.set_executable` has specified the Python to start.
     """
     named = os.fsdecode(spawn.get_executable() or "")
     if not named or (sys.flags.ignore_environment and not sys.flags.safe_path):
@@ -64,7 +64,7 @@ def can_start_processes() -> bool:
 
 
 def check_processes() -> None:
-    """Raise a ValueError where no other Python can be started."""
+    """Raise a ValueError if no other Python can be started."""
     if not can_start_processes():
         raise ValueError(
             f"no process can be started: {sys.executable!r} is not this Python, or ignores {_SAFE}; set jobs=1, give "
@@ -74,12 +74,12 @@ def check_processes() -> None:
 
 @contextmanager
 def safe_environment(more: Mapping[str, str] | None = None) -> Iterator[None]:
-    """Set the environment with which every Python is started: no module of the working directory is run.
+    """Set the environment in which every Python is started, so that it runs no module of the working directory.
 
     Parameters
     ----------
     more : mapping, optional
-        Other variables. What was there is put back at the end.
+        Further variables; earlier values are restored at the end.
     """
     changes = {_SAFE: "1", **(more or {})}
     with _CHANGING:
@@ -96,7 +96,7 @@ def safe_environment(more: Mapping[str, str] | None = None) -> Iterator[None]:
 
 
 class _SafeProcess(context.SpawnProcess):
-    """A process that is started with the environment above, and other variables, whenever the pool needs it."""
+    """A process that starts in the environment above, with further variables, whenever the pool needs it."""
 
     def __init__(self, more: Mapping[str, str], **options: Any) -> None:
         super().__init__(**options)
@@ -109,11 +109,11 @@ class _SafeProcess(context.SpawnProcess):
 
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Hand a task out, and start a process that no Ctrl-C reaches, not even while it imports; ours comes afterwards.
+    """Submit a task, and start a process that no Ctrl-C reaches, even during its imports; ours follows afterwards.
 
-    A signal blocked in this thread reaches another one, as of a BLAS, and is then handled here all the same: it is
-    only noted meanwhile. Else the process would be there, and what it is to do not yet written to it; or the executor
-    would not know of it, and wait for another one, the sign of whose end this one took.
+    A signal blocked in this thread reaches another one, for instance of a BLAS, and is then handled here: it is only
+    recorded meanwhile. Otherwise the process would exist before its task is written to it. Or the executor would not
+    register the process, and wait for another one whose end was signalled to this one.
     """
     handler = signal.getsignal(signal.SIGINT)
     if not hasattr(signal, "pthread_sigmask") or not callable(handler) or current_thread() is not main_thread():
@@ -133,7 +133,7 @@ def _uninterrupted() -> Iterator[None]:
 
 @contextmanager
 def _blocked() -> Iterator[None]:
-    """Block Ctrl-C in this thread, and in what it starts."""
+    """Block Ctrl-C in this thread, and in processes that it starts."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
@@ -145,14 +145,14 @@ def _blocked() -> Iterator[None]:
 
 
 def started_processes(workers: int, more: Mapping[str, str] | None = None) -> ProcessPoolExecutor:
-    """Start processes.
+    """Return an executor of new processes.
 
     Parameters
     ----------
     workers : int
-        How many.
+        Number of processes.
     more : mapping, optional
-        Variables of their environment.
+        Further variables of their environment.
 
     Raises
     ------
@@ -167,12 +167,12 @@ def started_processes(workers: int, more: Mapping[str, str] | None = None) -> Pr
         return started[-1]
 
     setattr(own, "Process", prepared)  # noqa: B010
-    with safe_environment(more):  # locks are kept by a process of their own
+    with safe_environment(more):  # a separate process keeps the locks
         return _StartedProcesses(workers, own, initializer=_begin_process, started=started)
 
 
 class _StartedProcesses(ProcessPoolExecutor):
-    """Processes of which none is left: one that an interrupt kept from joining the others would wait for ever."""
+    """Processes that all end, because one that an interrupt kept from joining would wait without end."""
 
     def __init__(self, *arguments: Any, started: list[Any], **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -193,7 +193,7 @@ class _StartedProcesses(ProcessPoolExecutor):
 
 
 def _begin_process() -> None:
-    """Begin a process of a pool: an interrupt goes to the one that waits for it, and it ends when that one does."""
+    """Initialise a process of a pool: its parent handles interrupts, and it ends with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     if parent is not None:
@@ -201,23 +201,23 @@ def _begin_process() -> None:
 
 
 def _end_with(sentinel: int) -> None:
-    """Wait for the end of another process, and end this one: a process that is killed cannot end those it started."""
+    """End this process after another one, which cannot end its children if it is killed."""
     connection.wait([sentinel])
     os._exit(1)
 
 
 @contextmanager
 def one_thread(*, of_blas_only: bool = False) -> Iterator[None]:
-    """Limit BLAS and OpenMP, or BLAS only, to one thread inside a `with` block; then return to what was there.
+    """Limit BLAS and OpenMP, or BLAS only, to one thread inside a `with` block; restore the earlier numbers.
 
     Notes
     -----
-    A BLAS has one number of threads for the whole process: the first of several tasks at the same time sets it, and the
-    last one sets it back. OpenMP has one for each thread that calls it.
+    A BLAS has one number of threads for the whole process: the first of several concurrent tasks sets it, and the last
+    one restores it. OpenMP has one for each calling thread.
     """
     from threadpoolctl import ThreadpoolController
 
-    import jointfrf.kernel.call  # noqa: F401  # its libraries are loaded before they are looked for
+    import jointfrf.kernel.call  # noqa: F401  # loads the libraries before the search for them
 
     libraries = ThreadpoolController().lib_controllers
     own = [(one, int(one.get_num_threads())) for one in libraries if one.user_api == "openmp" and not of_blas_only]
@@ -253,7 +253,7 @@ def _leave() -> None:
 
 
 def _set(library: Any, threads: int) -> None:
-    """Set the number of threads of a BLAS: threadpoolctl takes it from the thread that did so first, and no other."""
+    """Set the number of threads of a BLAS: threadpoolctl accepts it only from the thread that set it first."""
     release = getattr(library, "clear_controlling_thread", lambda force: None)
     release(force=True)
     library.set_num_threads(threads)
@@ -262,11 +262,11 @@ def _set(library: Any, threads: int) -> None:
 
 _T = TypeVar("_T")
 _R = TypeVar("_R")
-#: An executor, or what makes one: that is called again where the executor breaks.
+#: An executor, or a function that makes one and is called again if the executor breaks.
 AnyExecutor = Executor | Callable[[], Executor]
-#: Tasks submitted and not done, for each worker: one at work, and one so that it need not wait for the next.
+#: Tasks submitted and not done, for each worker: one running, and one so that it need not wait for the next.
 _WAITING = 2
-#: Times in a row, without a task done in between, that a broken executor is replaced.
+#: Number of times in a row, without a completed task, that a broken executor is replaced.
 _MADE_AGAIN = 3
 
 
@@ -279,7 +279,7 @@ _LOST = (BrokenExecutor, CancelledError)
 
 
 class _InThisThread(Executor):
-    """Does each task when it is submitted."""
+    """Runs each task on submission."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         future: Future[Any] = Future()
@@ -292,15 +292,16 @@ class _InThisThread(Executor):
 
 @dataclass
 class Pool(Generic[_T]):
-    """An executor, and how many tasks are submitted at the same time.
+    """An executor, and the number of tasks submitted at the same time.
 
     Attributes
     ----------
     executor : Executor
-        Only its `submit` is used.
+        Executor, of which only `submit` is used.
     workers : int
+        Number of workers.
     make : callable, optional
-        Makes another one where it breaks.
+        Function that makes another executor if it breaks.
     """
 
     executor: Executor
@@ -310,23 +311,23 @@ class Pool(Generic[_T]):
 
     @property
     def at_once(self) -> int:
-        """Tasks submitted and not done."""
+        """Number of tasks submitted and not done."""
         return 1 if isinstance(self.executor, _InThisThread) else _WAITING * self.workers
 
     def completed(self, function: Callable[[_T], _R], tasks: Iterator[_T]) -> Iterator[tuple[_T, _R]]:
-        """Do tasks, and yield each with its result as soon as that is available.
+        """Run tasks, and yield each with its result as soon as it is available.
 
         Parameters
         ----------
         function : callable
-            Of a module, so that it can be sent to another process.
+            Function of a module, so that it can be sent to another process.
         tasks : iterator
-            Asked for the next one when a worker needs it.
+            Tasks; the next one is requested when a worker needs it.
 
         Raises
         ------
         BrokenPoolError
-            The executor has broken, and there is nothing that makes another one, or that broke, too.
+            The executor has broken, and no function makes another one, or that one broke, too.
         """
         done: SimpleQueue[Future[_R]] = SimpleQueue()
         at_work: dict[Future[_R], _T] = {}
@@ -357,7 +358,7 @@ class Pool(Generic[_T]):
                 try:
                     result = future.result()
                 except _LOST as error:
-                    # The others are lost with it, or are given up: they are done again on the new one.
+                    # All other tasks are lost or abandoned, too, and run again on the new executor.
                     again += [task, *at_work.values()]
                     for other in at_work:
                         other.cancel()
@@ -387,11 +388,11 @@ def opened_pool(executor: AnyExecutor | None = None, jobs: int | None = None) ->
     Parameters
     ----------
     executor : Executor or callable, optional
-        What the caller has made and will end; or what makes one, which is ended here. Processes of this machine by
-        default.
+        Executor that the caller has made and will end; or a function that makes one, which is ended here. By default
+        processes of this machine.
     jobs : int, optional
-        Workers: processes where there is no executor, one of them this one; otherwise what bounds the number of tasks
-        submitted at the same time, by default what the executor says of itself.
+        Number of workers. Without an executor these are processes, including this one. Otherwise it limits the number
+        of tasks submitted at the same time, by default the number that the executor states.
 
     Raises
     ------
@@ -429,7 +430,7 @@ def check_progress(progress: object) -> None:
 
 
 def _workers_of(executor: Executor) -> int:
-    """Return the number of workers as executors of several packages call it; the cores of this machine otherwise."""
+    """Return the number of workers by its names in several packages; otherwise the number of cores of this machine."""
     for name in ("workers", "_max_workers", "num_workers"):
         found = getattr(executor, name, None)
         if isinstance(found, int) and found > 0:

@@ -1,4 +1,4 @@
-"""The lines of one large sweep, shared among the workers of an executor; results are written in their place."""
+"""Lines of one large sweep, distributed to the workers of an executor; results are written to their places."""
 
 from __future__ import annotations
 
@@ -22,34 +22,34 @@ from jointfrf.parallel.pool import AnyExecutor, BrokenPoolError, Pool, check_pro
 
 __all__ = ["SweepCost", "SweepPlan", "plan_sweep", "planned_sweep", "sweep"]
 
-#: Lines that the kernel takes as one share: chunks are multiples of it, so that they change no bit of a result.
+#: Number of lines in one share of the kernel: chunks are multiples of it, so that they change no bit of a result.
 _SHARE = 512
-#: Share of its time that a task may lose to being sent: too little to be seen.
+#: Share of its time that sending may cost a task: negligible.
 _OVERHEAD = 0.02
-#: Bytes of a task where its time allows: larger ones are not faster.
+#: Bytes of a task if its time allows: larger ones are not faster.
 _USUAL_BYTES = 8 * 2**20
-#: Tasks for each worker, at least: workers then end within a quarter of their time.
+#: Least number of tasks for each worker: workers then end within a quarter of their time.
 _TASKS = 4
-#: Lines of two measurements: their difference in time is that of the lines, without what a call costs.
+#: Numbers of lines of two measurements, whose difference in time does not contain the cost of a call.
 _SAMPLES = (512, 8192)
-#: Empty tasks for each worker, and places of which the median is taken: one disturbance changes nothing.
+#: Number of empty tasks for each worker, and of places whose median is used, so that one disturbance has no effect.
 _EMPTY, _REPEATED = 4, 3
-#: An operation, line by line: takes arrays by name, returns the result.
+#: An operation, line by line: takes arrays by name, and returns the result.
 LineFunction = Callable[..., NDArray[Any]]
 
 
 @dataclass(frozen=True)
 class SweepCost:
-    """What was measured.
+    """Measured times of a sweep.
 
     Attributes
     ----------
     line : float
-        Seconds of one worker for a line: reading and computing.
+        Time of one worker for a line, s: reading and computing.
     write : float
-        Seconds for writing a line.
+        Time for writing a line, s.
     task : float
-        Seconds for a task that does nothing: sending it, and its answer.
+        Time for an empty task, s: sending it, and its answer.
     """
 
     line: float
@@ -59,19 +59,22 @@ class SweepCost:
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """How a sweep is cut into tasks, and what it will take.
+    """Division of a sweep into tasks, and its expected time.
 
     Attributes
     ----------
     operation : str
+        Name of the operation.
     shapes : mapping of str to tuple
-        Of the inputs and of the result.
+        Shapes of the inputs and of the result.
     n_lines, chunk_lines : int
-        Lines in all, and of a task.
+        Numbers of lines in all, and of a task.
     workers : int
+        Number of workers.
     line_bytes : int
         Bytes of a line of all inputs and the result.
     cost : SweepCost
+        Measured times.
     """
 
     operation: str
@@ -89,22 +92,22 @@ class SweepPlan:
 
     @property
     def seconds(self) -> float:
-        """Time it will take, s: whole rounds of tasks on all workers."""
+        """Expected time, s: whole rounds of tasks on all workers."""
         each = min(self.chunk_lines, self.n_lines) * (self.cost.line + self.cost.write) + self.cost.task
         return math.ceil(self.n_tasks / self.workers) * each
 
     @property
     def task_bytes(self) -> int:
-        """Memory of a task: its lines of all inputs and of the result."""
+        """Memory of a task, bytes: its lines of all inputs and of the result."""
         return min(self.chunk_lines, self.n_lines) * self.line_bytes
 
     def chunks(self, first: int = 0) -> Iterator[slice]:
-        """Give the lines of each task, from a line on."""
+        """Yield the lines of each task, from a line on."""
         for start in range(first, self.n_lines, self.chunk_lines):
             yield slice(start, min(start + self.chunk_lines, self.n_lines))
 
     def __str__(self) -> str:
-        """Describe the plan for a reader."""
+        """Return a description of the plan."""
         orders = {name: " x ".join(map(str, shape[1:])) or "scalar" for name, shape in self.shapes.items()}
         shapes = ", ".join(f"{name} {order}" for name, order in orders.items())
         cost = self.cost
@@ -126,31 +129,34 @@ def _duration(seconds: float) -> str:
 def planned_sweep(
     operation: str, shapes: dict[str, tuple[int, ...]], n_lines: int, workers: int, cost: SweepCost
 ) -> SweepPlan:
-    """Choose the lines of a task.
+    """Return the plan of a sweep with the number of lines of a task.
 
     Parameters
     ----------
     operation : str
+        Name of the operation.
     shapes : dict of str to tuple
-        Of inputs and result.
+        Shapes of inputs and result.
     n_lines, workers : int
+        Numbers of lines and workers.
     cost : SweepCost
+        Measured times.
 
     Notes
     -----
-    A task takes at least 50 times what it costs to send it, unless it would then take more memory than 64 MiB or leave
-    workers without one. Tasks are multiples of 512 lines, whose results do not depend on the lines beside them.
+    A task takes at least 50 times the cost of sending it, unless it would need more memory than 64 MiB or leave workers
+    without a task. Tasks are multiples of 512 lines, whose results do not depend on neighbouring lines.
     """
     line_bytes = sum(16 * math.prod(shape[1:]) for shape in shapes.values())
     lines = cost.task / _OVERHEAD / max(cost.line + cost.write, 1e-12)
-    # Larger tasks than that lose nothing either, as long as all workers have some and their memory is small.
+    # Larger tasks lose nothing either, if all workers have some and their memory is small.
     lines = min(max(lines, _USUAL_BYTES / line_bytes), CHUNK_BYTES / line_bytes, n_lines / (_TASKS * workers))
     return SweepPlan(operation, shapes, n_lines, max(1, round(lines / _SHARE)) * _SHARE, workers, line_bytes, cost)
 
 
 @dataclass(frozen=True)
 class _SweepTask:
-    """Some lines: where they are read, and where the result goes, None where it is sent back."""
+    """Some lines: their inputs, and the place of the result, None if it is sent back."""
 
     operation: LineFunction
     inputs: Mapping[str, Lines]
@@ -159,7 +165,7 @@ class _SweepTask:
 
 
 class _Done(NamedTuple):
-    """What a task gave: its result where it is not written yet, a warning, and seconds."""
+    """Outcome of a task: its result if it is not written yet, a warning, and seconds."""
 
     values: NDArray[Any] | None
     warning: str
@@ -167,7 +173,7 @@ class _Done(NamedTuple):
 
 
 def _do(task: _SweepTask) -> _Done:
-    """Do a task on one thread."""
+    """Run a task on one thread."""
     with one_thread(), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", IllConditionedWarning)
         start = perf_counter()
@@ -192,7 +198,7 @@ def _nothing(_: int) -> None:
 
 @dataclass(frozen=True)
 class _Sweep:
-    """What is computed, its arrays checked."""
+    """An operation with its checked arrays."""
 
     operation: LineFunction
     inputs: dict[str, Lines]
@@ -214,7 +220,7 @@ class _Sweep:
 
 
 class _Finished:
-    """Which lines are done: all before `end`, and chunks beyond it."""
+    """Completed lines: all before `end`, and chunks beyond it."""
 
     def __init__(self, first: int) -> None:
         self.count = self.end = first
@@ -243,7 +249,7 @@ def _checked(operation: LineFunction, arrays: Mapping[str, ArrayLike], out: Any)
         same = own.place is not None and own.place == result.place
         if same or (isinstance(arrays[name], np.ndarray) and isinstance(out, np.ndarray)
                     and np.may_share_memory(arrays[name], out)):  # fmt: skip
-            raise ValueError(f"out shares its memory or file with {name}; give out one of its own")
+            raise ValueError(f"out shares its memory or file with {name}; give out a separate one")
     if not inputs or not result.shape[0]:
         raise ValueError("arrays contains no lines; give at least one array with at least one line")
     return _Sweep(operation, inputs, result)
@@ -260,48 +266,54 @@ def sweep(
     progress: Callable[[int, int], None] | None = None,
     first: int = 0,
 ) -> SweepPlan:
-    """Compute the lines of a sweep larger than memory, or than one machine, in chunks.
+    """Compute the lines of a sweep larger than memory, or than one machine, in chunks, and return the plan.
 
     Parameters
     ----------
     operation : callable
-        Computes each line by itself, such as `invert`, `inverse_substructuring`, or `couple` with what is the same for
-        all lines: ``functools.partial(jf.couple, dofs_a=[0], dofs_b=[0])``. Takes the arrays by name.
+        Function that computes each line by itself and takes the arrays by name, such as `invert` or
+        `inverse_substructuring`. Fix arguments that are equal for all lines:
+        ``functools.partial(jf.couple, dofs_a=[0], dofs_b=[0])``.
     arrays : mapping of str to array_like
-        Name of the argument to array, n_lines along its first axis: workers read `numpy.memmap` and
-        HDF5 datasets of a file open for reading; other arrays are sent to them.
+        Arrays by the name of the argument, n_lines along their first axis. Workers read `numpy.memmap` and HDF5
+        datasets of a file open for reading; other arrays are sent to them.
     out : ndarray, numpy.memmap or h5py.Dataset
-        Array of results, n_lines along its first axis. Workers write a memory map themselves; into other arrays this
-        process writes what they send back.
+        Array of results, n_lines along its first axis. Workers write a memory map themselves; this process writes
+        their results into other arrays.
     executor, jobs
-        As in `study`.
+        Executor and number of workers; see `study`.
     plan : SweepPlan, optional
-        What `plan_sweep` gave; measured first by default.
+        Result of `plan_sweep`; by default costs are measured first.
     progress : callable, optional
-        Called with the number of lines done, those before `first` included, and in all.
+        Function of the number of completed lines, including lines before `first`, and of the number of all lines.
     first : int
-        Line with which to begin, a multiple of 512 and of the lines that `out` writes together: that which
-        `BrokenPoolError` names, to go on with a sweep that lost its workers.
+        First line to compute, default 0, a multiple of 512 and of the lines that `out` writes together.
+        `BrokenPoolError` names it to continue a sweep that lost its workers.
 
     Returns
     -------
     SweepPlan
-        By which it was computed.
+        Plan of the computation.
 
     Raises
     ------
     SingularLineError
         A line is singular; `lines` counts from the first line of the sweep. Other chunks may have been written.
     ValueError
-        Wrong shapes; `out` where an input lies; what the operation raises, with the lines of the chunk.
+        Wrong shapes; `out` shares memory with an input; an error of the operation, with the lines of the chunk.
     BrokenPoolError
-        The executor has lost its workers, and there is nothing that makes another one. The text says up to which line
-        results are written, and with which `first` the rest is computed.
+        The executor has lost its workers, and no function makes another one. The message names the last written line,
+        and the value of `first` for the rest.
 
     Warns
     -----
     IllConditionedWarning
-        Once, for the first chunk with such lines.
+        A warning for the first chunk with such lines, once.
+
+    See Also
+    --------
+    plan_sweep : expected time and chunks.
+    invert, couple : operations line by line.
 
     Notes
     -----
@@ -346,7 +358,7 @@ def sweep(
         ) from error
     if poor:
         start, text = min(poor)
-        more = f"; so are lines of {len(poor) - 1} other chunks" if len(poor) > 1 else ""
+        more = f"; {len(poor) - 1} other chunks have such lines, too" if len(poor) > 1 else ""
         warnings.warn(f"{text}, counted from line {start}{more}", IllConditionedWarning, stacklevel=2)
     return used
 
@@ -359,22 +371,26 @@ def plan_sweep(
     executor: AnyExecutor | None = None,
     jobs: int | None = None,
 ) -> SweepPlan:
-    """Measure what a sweep costs on a few of its lines, and plan it; `out` is not touched.
+    """Measure the cost of a sweep on a few of its lines, and return a plan; `out` is not changed.
 
     Parameters
     ----------
     operation, arrays, out, executor, jobs
-        As in `sweep`.
+        Operation, arrays and workers; see `sweep`.
 
     Returns
     -------
     SweepPlan
-        Printed, it says how long the sweep will take, in how many tasks of how many lines.
+        Plan, which prints the expected time, and the numbers of tasks and of their lines.
 
     Raises
     ------
     SingularLineError, ValueError
-        As in `sweep`, in the lines that are measured.
+        An error of `sweep`, in the lines that are measured.
+
+    See Also
+    --------
+    sweep : the computation.
 
     Examples
     --------
@@ -404,7 +420,7 @@ def _measured(whole: _Sweep, pool: Pool[Any]) -> SweepPlan:
     few, many = (min(sample, whole.n_lines) for sample in _SAMPLES)
     values = np.empty(0)
     for lines in (few, many):
-        # Each time at another place, where the lines have not been read before.
+        # At another place each time, whose lines have not been read before.
         places = [(whole.n_lines - lines) * place // _REPEATED for place in range(_REPEATED)]
         tried = [_one(pool, whole.task(slice(at, at + lines), is_written=False)) for at in places]
         seconds.append(median(one.seconds for one in tried))
@@ -424,7 +440,7 @@ def _one(pool: Pool[Any], task: _SweepTask) -> _Done:
 
 
 def _write_seconds(out: Lines, values: NDArray[Any]) -> float:
-    """Return what writing takes: to a file beside that of the results, or in memory."""
+    """Return the time for writing, into a file next to the results, or into memory."""
     start = perf_counter()
     if out.place is None:
         values.copy()

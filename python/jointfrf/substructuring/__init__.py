@@ -1,1 +1,1 @@
-"""Coupling of substructures and the ways back to the joint, one equation of the thesis each."""
+"""Coupling of substructures, and the inverse, from FRFs to the joint; one function for each equation of the thesis."""

@@ -26,9 +26,13 @@ class FreeBody:
     Parameters
     ----------
     h : array_like, shape (n_freq, n, n)
-        m/N (rotational rows rad/N, rotational columns m/(N m)).
+        Receptances, m/N (rotational rows rad/N, rotational columns m/(N m)).
     dofs : sequence of str
         Names of its DOFs, ``"3:y"``.
+
+    See Also
+    --------
+    couple_bodies : receptances of connected bodies.
 
     Examples
     --------
@@ -56,9 +60,13 @@ class BodyLink:
     Parameters
     ----------
     joint : Joint or LawJoint
-        A `LawJoint` may have rigid DOFs and masses: ``LawJoint({}, rigid=["x", "y"])``.
+        Joint; a `LawJoint` may have rigid DOFs and masses: ``LawJoint({}, rigid=["x", "y"])``.
     first, second : sequence of str
-        DOFs ``"A/3:y"`` in the order of the joint; without `second` the joint holds on to the ground.
+        DOFs ``"A/3:y"`` on both sides in the order of the joint; without `second` the joint acts against the ground.
+
+    See Also
+    --------
+    couple_bodies : receptances of connected bodies.
 
     Examples
     --------
@@ -82,7 +90,7 @@ class BodyLink:
 
 
 class _Rows(NamedTuple):
-    """Rows of one connection: DOFs plus and minus counted from 1 (0 for the ground), which are rigid, and T."""
+    """Rows of one connection: DOFs plus and minus counted from 1 (0 for the ground), flags of rigid rows, and T."""
 
     ends: NDArray[np.int32]
     rigid: NDArray[np.int32]
@@ -107,37 +115,42 @@ def couple_bodies(
     Parameters
     ----------
     freq_hz : array_like, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     bodies : mapping of str to FreeBody
-        By name.
+        Bodies by name.
     links : iterable of BodyLink
-        Any number between any DOFs, in loops and to the ground.
+        Any number of joints between any DOFs, in loops and to the ground.
     responses, forces : sequence of str, optional
-        DOFs ``"A/3:y"`` that are wanted; by default all, body after body.
+        DOFs ``"A/3:y"`` of the rows and columns; by default all, body after body.
     on_singular : {"raise", "nan"}
-        Whether a bad line raises or becomes NaN.
+        Whether a singular line raises an error (default) or becomes NaN.
 
     Returns
     -------
     ndarray, shape (n_freq, n_responses, n_forces)
-        m/N.
+        Receptances, m/N.
 
     Raises
     ------
     SingularLineError
-        The assembly resonates without damping at a line, or rigid connections hold a rigid body more than once: the
-        matrix to be inverted is singular to working precision (its reciprocal condition number is below q times the
-        machine epsilon, with q rows).
+        The assembly resonates without damping at a line, or rigid connections fix a rigid body more than once. The
+        matrix to be inverted is then singular to working precision: its reciprocal condition number is below q times
+        the machine epsilon, with q rows.
     ValueError
-        Names that there are not; shapes that do not agree; NaN or Inf in a line.
+        Names that do not exist; shapes that do not agree; NaN or Inf in a line.
+
+    See Also
+    --------
+    couple : two bodies and one joint.
+    Assembly : an assembly with unknowns, for fits.
 
     Notes
     -----
-    Y = H - H B^T (S + T B H B^T)^-1 T B H: the dual assembly of [1]_ where all is rigid (S = 0, T = 1); S = 1 and
-    T = K* for a stiffness. H is block-diagonal: products are those of one body with the rows it has a part in.
+    Y = H - H B^T (S + T B H B^T)^-1 T B H is the dual assembly of [1]_ if all connections are rigid (S = 0, T = 1); a
+    stiffness has S = 1 and T = K*. H is block-diagonal, so that each product involves one body and its rows.
 
-    A rigid connection that follows from others (A-B, B-C, C-A) adds nothing and is left out: the signed Boolean matrix
-    B of all rigid rows is the incidence matrix of a graph, whose rank is the size of a spanning forest.
+    A rigid connection that follows from others (A-B, B-C, C-A) adds nothing and is omitted. The signed Boolean matrix B
+    of all rigid rows is the incidence matrix of a graph, whose rank is the size of a spanning forest.
 
     References
     ----------
@@ -146,7 +159,7 @@ def couple_bodies(
 
     Examples
     --------
-    Three masses in a ring of springs of 3 N/m, held by springs of 2 N/m, at rest:
+    Three masses in a ring of springs of 3 N/m, each with a spring of 2 N/m to the ground, at rest:
 
     >>> import numpy as np, jointfrf as jf
     >>> bodies = {name: jf.FreeBody(np.full((1, 1, 1), 0.5), ["x"]) for name in "ABC"}
@@ -183,7 +196,7 @@ def couple_bodies(
 
 
 def _named(bodies: Mapping[str, FreeBody], n_freq: int) -> dict[str, FreeBody]:
-    """Return the bodies, of which there is at least one, all on the same lines."""
+    """Return the bodies, at least one, all on the same lines."""
     if not isinstance(bodies, Mapping) or not bodies:
         raise TypeError(f"bodies must be a mapping of names to FreeBody, not {one_line(bodies)}")
     for name, body in bodies.items():
@@ -236,11 +249,11 @@ def _rows(link: BodyLink, number: Mapping[str, int], freq_hz: FloatArray) -> _Ro
     plus, minus = (np.abs(own.pattern * (own.pattern * sign > 0)) for sign in (1, -1))
     ends = np.stack([(places @ side).astype(np.int32) for side in (plus, minus)], 1)
     rigid = (np.diagonal(own.s, axis1=1, axis2=2)[:1] == 0).any(axis=0).astype(np.int32)
-    return _Rows(ends, rigid, own.t).only(ends[:, 0] > 0)  # half the mass of a joint to the ground moves with it
+    return _Rows(ends, rigid, own.t).only(ends[:, 0] > 0)  # half the mass of a joint to the ground moves with the body
 
 
 def _independent(rows: Sequence[_Rows]) -> list[_Rows]:
-    """Leave out rigid rows that follow from others."""
+    """Return the rows without rigid ones that follow from others."""
     ends, rigid = (np.concatenate(parts) for parts in zip(*((one.ends, one.rigid) for one in rows), strict=True))
     kept = rigid == 0
     kept[~kept] = ~redundant_ties(ends[~kept])

@@ -32,7 +32,7 @@ __all__ = [
     "multi_point_stiffness",
 ]
 
-#: Without truncation a matrix counts as singular when its smallest singular value is below this share of the largest.
+#: Ratio of the smallest to the largest singular value below which a matrix is singular, without truncation.
 _SINGULAR = 1e-14
 
 
@@ -43,30 +43,35 @@ def joint_compliance(
     on_singular: OnSingular = "raise",
     out: ComplexArray | None = None,
 ) -> ComplexArray:
-    """Joint compliance C = K*^-1 without model, first estimate or band.
+    """Return the joint compliance C = K*^-1 without model, initial value or band.
 
     Parameters
     ----------
     gamma : array_like, shape (n_freq, 2 n, 2 n)
         Receptance of the assembly at joint DOFs j, then k, m/N.
     freq_hz, on_singular, out
-        As in `couple`.
+        Frequencies, Hz, treatment of singular lines, and array for the result; see `couple`.
 
     Returns
     -------
     ndarray, shape (n_freq, n, n)
-        C, m/N: relative displacement across the joint per force through it.
+        Compliance C, m/N: relative displacement across the joint per force through it.
 
     Raises
     ------
     SingularLineError, ValueError
-        As in `couple`.
+        An error of `couple`.
+
+    See Also
+    --------
+    compliance_covariance : covariance of C by noise.
+    inverse_substructuring : K* itself.
+    identify : maximum likelihood from C of all lines.
 
     Notes
     -----
-    C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj, exactly. Noise enters C almost linearly, while it enters K* through an
-    inverse: averaging K*, an inverse of noisy data, over a band is biased towards zero where the noise exceeds the
-    compliance, averaging C is not.
+    C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj, exactly. Noise enters C almost linearly, but it enters K* through an
+    inverse. A mean of K* over a band is biased towards zero if the noise exceeds the compliance; a mean of C is not.
 
     Examples
     --------
@@ -94,21 +99,28 @@ def compliance_factors(
     Parameters
     ----------
     gamma : array_like, shape (n_freq, 2 n, 2 n)
-        Receptance about which is linearised, m/N.
+        Receptance of the linearisation, m/N.
     transform : array_like, shape (2 n, m), optional
-        T of gamma = T h T^T; by default gamma itself was measured.
+        Matrix T of gamma = T h T^T; by default gamma itself was measured.
     freq_hz, on_singular
-        As in `couple`.
+        Frequencies, Hz, and treatment of singular lines; see `couple`.
 
     Returns
     -------
     u : ndarray, shape (n_freq, n, m)
+        Factor U.
     v : ndarray, shape (n_freq, m, n)
+        Factor V.
 
     Raises
     ------
     SingularLineError, ValueError
-        As in `couple`.
+        An error of `couple`.
+
+    See Also
+    --------
+    joint_compliance : the compliance itself.
+    compliance_covariance : covariance by these factors.
 
     Notes
     -----
@@ -143,30 +155,35 @@ def compliance_covariance(
     freq_hz: ArrayLike | None = None,
     on_singular: OnSingular = "raise",
 ) -> ComplexArray:
-    """Covariance of the entries of the joint compliance from the noise of the measured FRFs, to first order.
+    """Return the covariance of the entries of the joint compliance by noise of the measured FRFs, to first order.
 
     Parameters
     ----------
     gamma : array_like, shape (n_freq, 2 n, 2 n)
-        Receptance about which is linearised, m/N: a smoothed one, so that the weights do not follow the noise.
+        Receptance of the linearisation, m/N: a smoothed one, so that the weights do not follow the noise.
     variance : array_like, shape (n_freq, m, m)
-        E|e|^2 of the measured FRFs h, (m/N)^2; circular noise, independent between entries.
+        Noise variance E|e|^2 of the measured FRFs h, (m/N)^2; circular noise, independent between entries.
     transform : array_like, shape (2 n, m), optional
-        T of gamma = T h T^T; by default gamma itself was measured.
+        Matrix T of gamma = T h T^T; by default gamma itself was measured.
     reciprocal : bool
         Whether h was symmetrised, (h + h^T)/2, before.
     freq_hz, on_singular
-        As in `couple`.
+        Frequencies, Hz, and treatment of singular lines; see `couple`.
 
     Returns
     -------
     ndarray, shape (n_freq, n * n, n * n)
-        E[dC_ab conj(dC_cd)] at row a n + b, column c n + d, (m/N)^2.
+        Covariance E[dC_ab conj(dC_cd)] at row a n + b, column c n + d, (m/N)^2.
 
     Raises
     ------
     SingularLineError, ValueError
-        As in `couple`.
+        An error of `couple`.
+
+    See Also
+    --------
+    joint_compliance : the compliance itself.
+    compliance_factors : its derivative.
 
     Notes
     -----
@@ -200,13 +217,13 @@ class MultiPointJoint(NamedTuple):
     lines : ndarray, shape (n_freq, m_j, m_k) or (n_freq, m_k, m_j)
         Stiffness, N/m, or compliance, m/N, between channels.
     equivalent : ndarray, shape (n_freq, n, n)
-        The same at the virtual points, rotational rows and columns included.
+        Stiffness or compliance at the virtual points, including rotational rows and columns.
     rank : ndarray of int, shape (n_freq,)
         Number of singular values used in the inverse of each line.
     singular_values : ndarray, shape (n_freq, q)
-        Of the matrix that was inverted, m/N, in decreasing order.
+        Singular values of the inverted matrix, m/N, in decreasing order.
     threshold : ndarray, shape (n_freq,)
-        Size below which a singular value is taken for noise, m/N; 0 where no noise was given.
+        Size below which a singular value is noise, m/N; 0 if no noise was given.
     """
 
     lines: ComplexArray
@@ -224,29 +241,29 @@ def multi_point_stiffness(
     rank: int | None = None,
     noise: float | ArrayLike | None = None,
 ) -> MultiPointJoint:
-    """Stiffness of a joint between all channels of both sides, and of the joint between their virtual points.
+    """Return the stiffness of a joint between all channels of both sides, and between their virtual points.
 
     Parameters
     ----------
     gamma : array_like, shape (n_freq, m_j + m_k, m_j + m_k)
         Receptance of the assembly at the channels of side j, then k, m/N: translations only.
     side_j, side_k : VirtualPoint
-        Of the m_j and m_k channels, with the same n DOFs in the same order.
+        Virtual points of the m_j and m_k channels, with the same n DOFs in the same order.
     rank : int, optional
         Number of singular values of every line to use.
     noise : float or array_like, shape (n_freq, m_j + m_k, m_j + m_k), optional
-        Instead of `rank`: relative noise level of each entry, 0.01 for 1 %, or the variance E|e|^2 of each, (m/N)^2.
-        Singular values that this noise can make by itself are not used. With neither, all are.
+        Noise in place of `rank`: relative noise level of each entry, 0.01 for 1 %, or the variance E|e|^2 of each,
+        (m/N)^2. Singular values that noise alone can cause are not used. Without `rank` and `noise` all are used.
 
     Returns
     -------
     MultiPointJoint
-        With `lines` K_m = -(gamma^+)_jk, N/m, and `equivalent` R_j^T K_m R_k, N/m, N, N m/rad.
+        Joint with `lines` K_m = -(gamma^+)_jk, N/m, and `equivalent` R_j^T K_m R_k, N/m, N, N m/rad.
 
     Raises
     ------
     SingularLineError
-        A line is singular to working precision, and neither `rank` nor `noise` was given.
+        A line is singular to working precision, and no `rank` and no `noise` was given.
     ValueError
         Wrong shapes, rank or noise; different DOFs of the sides; NaN or Inf in a line.
 
@@ -255,28 +272,34 @@ def multi_point_stiffness(
     IdentificationWarning
         On some lines fewer than 2 n singular values are used, so that a part of the equivalent joint is missing.
 
+    See Also
+    --------
+    multi_point_compliance : the compliance, better for stiff joints.
+    virtual_points : virtual points of both sides.
+
     Notes
     -----
-    A massless joint puts forces -S [u_j; u_k] on the channels, and gamma^-1 = diag(Z_A, Z_B) + S. Hence K_m = -S_jk is
-    the force on each channel of j per displacement of each of k. When side k moves as a rigid body, the resultants on
+    A massless joint exerts forces -S [u_j; u_k] on the channels, and gamma^-1 = diag(Z_A, Z_B) + S. Hence K_m = -S_jk
+    is the force on each channel of j per displacement of each of k. If side k moves as a rigid body, the resultants on
     the point of j are R_j^T K_m R_k: the equivalent, a property of the joint alone. Its rotations need no rotational
     FRFs. This is exact in two cases:
 
-    - The joint acts through the channels only, springs between them for instance, and gamma is regular: patches that
-      deform. A virtual point transformation would count the deformation as part of the joint here.
+    - The joint acts through the channels only, for instance by springs between them, and gamma is regular: flexible
+      patches. A virtual point transformation would count the deformation as part of the joint here.
     - The patches are rigid. Then gamma has rank 2 n: ``rank=2 * n`` gives the joint of the virtual points, with
-      K_m = T_j^T K T_k, of minimum norm: how the channels of a rigid patch share the forces cannot be identified.
+      K_m = T_j^T K T_k, of minimum norm, because the shares of the channels in the forces cannot be identified.
 
-    In between, nearly rigid patches with noise, the small singular values are the deformation of the patches and the
-    inverse amplifies their noise; `rank` and `noise` leave them out, and `rank` of the result says how many were used.
+    For nearly rigid patches with noise, the small singular values are the deformation of the patches, and the inverse
+    amplifies their noise. `rank` and `noise` omit them, and `rank` of the result is the number of values used.
     Truncation is a bias: the stiffer a joint, the smaller its relative motion, which is truncated first. For stiff
     joints use `multi_point_compliance`, or `identify` with `virtual_points`.
 
-    Threshold of noise: the largest root of a row sum of the variances plus that of a column sum, the expected largest
-    singular value of independent noise (exactly so for equal variances and large matrices).
+    The threshold by noise is the sum of two roots: of the largest row sum and of the largest column sum of the
+    variances. This is the expected largest singular value of independent noise, exactly for equal variances and large
+    matrices.
 
-    To regenerate the assembly: ``couple(h_a, h_b, lines, ...)`` where the channels lie opposite one another, or
-    `append_virtual_point` and the equivalent where they do not.
+    To regenerate the assembly, use ``couple(h_a, h_b, lines, ...)`` if the channels are opposite each other, otherwise
+    `append_virtual_point` and the equivalent.
 
     References
     ----------
@@ -317,45 +340,50 @@ def multi_point_compliance(
     rank: int | None = None,
     noise: float | ArrayLike | None = None,
 ) -> MultiPointJoint:
-    """Compliance of a joint between all channels of both sides, and of the joint between their virtual points.
+    """Return the compliance of a joint between all channels of both sides, and between their virtual points.
 
     Parameters
     ----------
     gamma, side_j, side_k
-        As in `multi_point_stiffness`.
+        Receptance and virtual points; see `multi_point_stiffness`.
     rank : int, optional
-        Number of singular values of gamma_jk to use: the number of forces that the joint passes, n for a joint between
+        Number of singular values of gamma_jk to use: the number of forces through the joint, n for a joint between
         virtual points.
     noise : float or array_like, optional
-        As in `multi_point_stiffness`, for gamma_jk.
+        Noise in place of `rank`; see `multi_point_stiffness`, for gamma_jk.
 
     Returns
     -------
     MultiPointJoint
-        With `lines` C_m = gamma_kk gamma_jk^+ gamma_jj - gamma_kj, m/N, rows k and columns j, and `equivalent`
+        Joint with `lines` C_m = gamma_kk gamma_jk^+ gamma_jj - gamma_kj, m/N, rows k and columns j, and `equivalent`
         T_k C_m T_j^T, m/N, 1/N, rad/(N m).
 
     Raises
     ------
     SingularLineError, ValueError
-        As in `multi_point_stiffness`.
+        An error of `multi_point_stiffness`.
 
     Warns
     -----
     IdentificationWarning
         On some lines fewer than n singular values are used, so that a part of the equivalent joint is missing.
 
+    See Also
+    --------
+    multi_point_stiffness : the stiffness, better for soft joints.
+    joint_compliance : compliance at joint DOFs.
+
     Notes
     -----
-    Noise enters almost linearly, and only gamma_jk is inverted, which has one singular value above the noise for each
-    force that the joint passes; their number shows what kind of joint it is. A soft joint above its resonances passes
-    little force, and gamma_jk lies below the noise: `multi_point_stiffness` is more accurate there.
+    Noise enters almost linearly. Only gamma_jk is inverted, which has one singular value above the noise for each force
+    through the joint; their number shows the kind of joint. A soft joint above its resonances transmits little force,
+    and gamma_jk is below the noise: `multi_point_stiffness` is more accurate there.
 
-    For a joint between virtual points, which acts on the patches as T^T g, the equivalent with ``rank=n`` is K*^-1
-    whether the patches deform or not; so is `joint_compliance` of the transformed receptances. For a joint of
-    independent springs between opposite channels C_m is the inverse of their stiffness when all singular values are
-    used. The equivalents of `multi_point_stiffness` and of this function are inverses of one another where the patches
-    are rigid; where they are not, their difference shows how much the patches deform.
+    For a joint between virtual points, which acts on the patches as T^T g, the equivalent with ``rank=n`` is K*^-1 for
+    rigid and for flexible patches; `joint_compliance` of the transformed receptances is K*^-1, too. For a joint of
+    independent springs between opposite channels C_m is the inverse of their stiffness if all singular values are used.
+    The equivalents of `multi_point_stiffness` and of this function are inverses of each other if the patches are rigid;
+    otherwise their difference shows the deformation of the patches.
 
     Examples
     --------
@@ -404,7 +432,7 @@ def _variance(noise: float | ArrayLike | None, lines: ComplexArray) -> FloatArra
 
 
 class _TruncatedInverse(NamedTuple):
-    """Pseudo-inverse of every line, the singular values, how many of them it uses, and the threshold of noise."""
+    """Pseudo-inverse of every line, the singular values, the number of values in use, and the threshold of noise."""
 
     inverse: ComplexArray
     used: NDArray[np.intp]
@@ -415,7 +443,7 @@ class _TruncatedInverse(NamedTuple):
 def _truncated_inverse(
     lines: ComplexArray, rank: int | None, variance: FloatArray | None, name: str
 ) -> _TruncatedInverse:
-    """Invert by the singular values asked for: `rank` of them, those above the noise, or all."""
+    """Return the inverse by the chosen singular values: `rank` of them, those above the noise, or all."""
     n_freq, most = lines.shape[0], min(lines.shape[1:])
     if rank is not None and variance is not None:
         raise ValueError("rank and noise exclude one another; give one of them")
@@ -437,7 +465,7 @@ def _truncated_inverse(
 
 
 def _check_regular(size: FloatArray, name: str) -> None:
-    """Raise if the smallest singular value of a line is zero to working precision."""
+    """Raise an error if the smallest singular value of a line is zero to working precision."""
     singular = np.flatnonzero(~(size[:, -1] > _SINGULAR * size[:, 0]))
     if singular.size:
         raise SingularLineError(

@@ -49,12 +49,13 @@ def connection_forces(
     between : ndarray, shape (n_freq, q, q)
         E^T H E: receptances of the structures across the connections before they are connected, m/N.
     link : Connection
-        S f = T u with q motions u = E^T x.
+        Connection S f = T u with q motions u = E^T x.
 
     Returns
     -------
     ndarray, shape (n_freq, q, q)
-        (S + T E^T H E)^-1 T, N/m; S = 0 leaves the dual form of a constraint, S = 1 the form of a modification (2.35).
+        Matrix (S + T E^T H E)^-1 T, N/m; S = 0 is the dual form of a constraint, S = 1 the form of a modification
+        (2.35).
 
     Raises
     ------
@@ -75,12 +76,12 @@ def lost_rcond(q: int) -> float:
 
 
 def redundant_ties(ends: NDArray[np.integer]) -> NDArray[np.bool_]:
-    """Return which rigid ties follow from those before them.
+    """Return which rigid ties follow from earlier ones.
 
     Parameters
     ----------
     ends : ndarray of int, shape (m, 2)
-        DOFs that each tie makes equal; one number stands for the ground.
+        DOFs that each tie makes equal; one number represents the ground.
 
     Notes
     -----
@@ -103,7 +104,7 @@ def redundant_ties(ends: NDArray[np.integer]) -> NDArray[np.bool_]:
 
 
 def _without_redundant(link: Connection) -> Connection:
-    """Take the forces of rigid connections that follow from others as zero: S = 1, T = 0 there."""
+    """Return a connection with zero forces in rigid connections that follow from others: S = 1, T = 0 there."""
     rigid = np.flatnonzero(~link.s.any(axis=(0, 2)))
     if rigid.size < 2 or not len(link.s):
         return link
@@ -121,7 +122,7 @@ def motions_across(h: ComplexArray, pattern: FloatArray) -> ComplexArray:
 
     Notes
     -----
-    A column of E has an entry or two: with many connections a dense product takes ten times as long.
+    A column of E has one or two entries: with many connections a dense product takes ten times as long.
     """
     found = np.zeros((*h.shape[:2], pattern.shape[1]), np.complex128)
     for rows, factors in _entries(pattern.shape, pattern.tobytes()):
@@ -160,30 +161,30 @@ def couple(
     on_singular: OnSingular = "raise",
     out: ComplexArray | None = None,
 ) -> ComplexArray:
-    """Receptance of the assembly of A and B through a flexible joint, all blocks.
+    """Return the receptance of the assembly of A and B through a flexible joint, all blocks.
 
     Parameters
     ----------
     h_a : array_like, shape (n_freq, n_a, n_a)
         Receptance of A, m/N (rotational rows rad/N, rotational columns m/(N m)).
     h_b : array_like, shape (n_freq, n_b, n_b)
-        Receptance of B.
+        Receptance of B, m/N.
     k_joint : array_like, shape (n_freq, n_j, n_j) or (n_j, n_j)
-        Complex joint stiffness K*, N/m (rotational N m/rad). A DOF without stiffness is allowed. Or a `Joint` or
-        `LawJoint`, with `freq_hz`: the latter may have rigid DOFs and masses.
+        Complex joint stiffness K*, N/m (rotational N m/rad); a DOF may have no stiffness. Or, with `freq_hz`, a `Joint`
+        or a `LawJoint`, which may have rigid DOFs and masses.
     dofs_a, dofs_b : array_like of int, shape (n_j,)
         Joint DOFs j of A and k of B, counted from 0, in the same order.
     freq_hz : array_like, shape (n_freq,), optional
-        Frequencies in Hz, to name a bad line; needed for a `Joint` or `LawJoint`.
+        Frequencies, Hz, for the message about a singular line; needed for a `Joint` or `LawJoint`.
     on_singular : {"raise", "nan"}
-        Whether a bad line raises or becomes NaN.
+        Whether a singular line raises an error (default) or becomes NaN.
     out : ndarray of complex128, optional
-        Where the result goes, as in `invert`.
+        Array for the result, see `invert`.
 
     Returns
     -------
     ndarray, shape (n_freq, n_a + n_b, n_a + n_b)
-        DOFs of A, then DOFs of B.
+        Receptance, m/N, for DOFs of A, then DOFs of B.
 
     Raises
     ------
@@ -191,6 +192,11 @@ def couple(
         The joint and the substructures resonate without damping at a line.
     ValueError
         Wrong shapes or DOFs; NaN or Inf in a line.
+
+    See Also
+    --------
+    couple_bodies : any number of bodies and joints.
+    assemble : matrices of the assembly of two models.
 
     Notes
     -----
@@ -234,7 +240,7 @@ def _coupled(
     on_singular: OnSingular,
     out: ComplexArray | None,
 ) -> ComplexArray:
-    """Couple through constraints and masses, too."""
+    """Return the receptance with constraints and masses, too."""
     n_a, n = a.shape[1], a.shape[1] + b.shape[1]
     h = np.zeros((freq_hz.size, n, n), np.complex128)
     for name, lines in (("h_a", a), ("h_b", b)):
@@ -261,40 +267,45 @@ def semm(
     rcond: float = 1e-12,
     freq_hz: ArrayLike | None = None,
 ) -> ComplexArray:
-    """Expand measured FRFs to all DOFs of a model.
+    """Return measured FRFs expanded to all DOFs of a model.
 
     Parameters
     ----------
     h_model : array_like, shape (n_freq, n, n)
-        FRFs of the parent model between all DOFs g that are wanted, m/N.
+        FRFs of the parent model between all wanted DOFs g, m/N.
     h_measured : array_like, shape (n_freq, m_o, m_i)
         Measured FRFs, m/N.
     outputs, inputs : array_like of int, shape (m_o,), (m_i,)
         DOFs of the model at which responses and forces were measured, counted from 0; `inputs` are the `outputs` by
         default.
     method : {"original", "extended"}
-        Which part of the parent model is taken out: that of the measured DOFs only, or that of all of its DOFs, which
-        leaves less of the model in the result.
+        Part of the parent model that is removed: the measured DOFs only, or all of its DOFs, so that less of the model
+        remains in the result.
     rcond : float
-        Singular values below this share of the largest are taken as zero in the pseudo-inverses.
+        Ratio to the largest singular value below which singular values are zero in the pseudo-inverses.
     freq_hz : array_like, shape (n_freq,), optional
-        Frequencies in Hz, to name a bad line.
+        Frequencies, Hz, for the message about a singular line.
 
     Returns
     -------
     ndarray, shape (n_freq, n, n)
-        m/N. At the measured DOFs it is the measurement: its noise is expanded, too (`semm_standard_error`).
+        FRFs, m/N. At the measured DOFs they are the measurement: its noise is expanded, too (`semm_standard_error`).
 
     Raises
     ------
     ValueError
         Wrong shapes or DOFs, NaN or Inf in a line.
 
+    See Also
+    --------
+    semm_standard_error : standard errors of the expanded FRFs.
+    identify_model : fit of a joint to the measured FRFs without expansion.
+
     Notes
     -----
     Original: Y = Y_gg - Y_gb Y_bb^-1 (Y_bb - Y_meas) Y_bb^-1 Y_bg. Extended: Y = Y_gg - Y_gg Y_bg^+ (Y_bb - Y_meas)
-    Y_gb^+ Y_gg, with pseudo-inverses. Both are the parent model, less the removed one, plus the measurement, coupled at
-    the measured and, extended, at all DOFs. Where noise is known and a joint is sought, `identify_model` uses the
+    Y_gb^+ Y_gg, with pseudo-inverses. Both are the parent model, minus the removed one, plus the measurement, coupled
+    at the measured and, for "extended", at all DOFs. To identify a joint with known noise, `identify_model` uses the
     same FRFs without expanding them.
 
     References
@@ -336,34 +347,39 @@ def semm_standard_error(
     rcond: float = 1e-12,
     freq_hz: ArrayLike | None = None,
 ) -> FloatArray:
-    """Return the standard error of each FRF that `semm` expands, by the noise of the measured ones.
+    """Return the standard error of each FRF that `semm` expands, by noise of the measured ones.
 
     Parameters
     ----------
     h_model, h_measured, outputs, inputs, method, rcond
-        As in `semm`.
+        FRFs and options; see `semm`.
     noise : float or array_like, shape (n_freq, m_o, m_i), optional
-        Relative noise of the measured FRFs, or E|e|^2 of each, (m/N)^2. By default it is found, as `estimate_noise`
-        does, which needs `freq_hz`.
+        Relative noise of the measured FRFs, or E|e|^2 of each, (m/N)^2. By default `estimate_noise` estimates it, which
+        needs `freq_hz`.
     freq_hz : array_like, shape (n_freq,), optional
-        Hz.
+        Frequencies, Hz.
 
     Returns
     -------
     ndarray of float, shape (n_freq, n, n)
-        sqrt(E|e|^2), m/N, of real and imaginary part together: |Y - true| is below 1.73 times that in 95 % of cases,
-        and each part is within 1.96 / sqrt(2) times that.
+        Standard error sqrt(E|e|^2), m/N, of real and imaginary part together. In 95 % of cases |Y - true| is below 1.73
+        standard errors, and each part is within 1.96 / sqrt(2) standard errors.
 
     Raises
     ------
     ValueError
-        Wrong shapes or DOFs, NaN or Inf in a line, noise that is negative; FRFs whose noise is not seen.
+        Wrong shapes or DOFs, NaN or Inf in a line, noise that is negative; FRFs whose noise cannot be estimated.
+
+    See Also
+    --------
+    semm : the expanded FRFs.
+    estimate_noise : noise of measured FRFs.
 
     Notes
     -----
-    Y is linear in the measured FRFs, Y = ... + L Y_meas R, so that this is exact for circular noise that is independent
-    between them: E|e_ab|^2 = sum |L_ap|^2 E|e_pq|^2 |R_qb|^2. Where the FRFs were made reciprocal before, h_pq and
-    h_qp have one noise, with |L_ap R_qb + L_aq R_pb|^2 for each pair. What is wrong with the parent model is not in it.
+    Y is linear in the measured FRFs, Y = ... + L Y_meas R. The result is therefore exact for circular noise that is
+    independent between them: E|e_ab|^2 = sum |L_ap|^2 E|e_pq|^2 |R_qb|^2. If the FRFs were made reciprocal before, h_pq
+    and h_qp have one noise, with |L_ap R_qb + L_aq R_pb|^2 for each pair. Errors of the parent model are not included.
 
     Examples
     --------
@@ -393,7 +409,7 @@ def semm_standard_error(
     else:
         variance = as_real("noise", noise, shape)
         if (variance < 0).any():
-            raise ValueError("noise must hold variances E|e|^2 of each measured FRF, none below 0")
+            raise ValueError("noise must be variances E|e|^2 of each measured FRF, none below 0")
     left, right = expansion.factors()
     total = abs(left) ** 2 @ variance @ abs(right) ** 2
     if is_square and np.allclose(measured, measured.swapaxes(1, 2), rtol=1e-9, atol=0):
@@ -405,7 +421,7 @@ def semm_standard_error(
 
 
 class _Expansion(NamedTuple):
-    """A parent model, the places of what was measured, and how it is expanded."""
+    """A parent model, the places of the measured DOFs, and the method of expansion."""
 
     model: ComplexArray
     outputs: NDArray[np.int32]
@@ -426,7 +442,7 @@ class _Expansion(NamedTuple):
 def _expansion(
     h_model: ArrayLike, outputs: ArrayLike, inputs: ArrayLike | None, method: SemmMethod, rcond: float
 ) -> _Expansion:
-    """Check what `semm` expands by."""
+    """Check the arguments of `semm` and return the expansion."""
     check_choice("method", method, get_args(SemmMethod))
     model = as_lines("h_model", h_model)
     n, columns = model.shape[1:]

@@ -1,4 +1,4 @@
-"""The methods that give K*(w) line by line: decoupling (2.53)-(2.56), and a table of all with what each needs."""
+"""Methods that give K*(w) line by line: decoupling (2.53)-(2.56), and a table of all with their arguments."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from jointfrf.substructuring.modification import inverse_substructuring, ismm
 __all__ = ["STIFFNESS_METHODS", "JointFrfs", "StiffnessMethod", "decouple", "joint_stiffness"]
 
 Equation = Literal["rr", "rs", "sr", "ss"]
-#: What all decoupling equations need of the substructures.
+#: Fields of the substructures that all decoupling equations need.
 _SUBSTRUCTURES = ("h_a", "h_b", "dofs_j", "dofs_k")
 
 
@@ -44,7 +44,7 @@ def decouple(
     on_singular: OnSingular = "raise",
     out: ComplexArray | None = None,
 ) -> ComplexArray:
-    """Joint stiffness from FRFs of the assembly away from the joint and of both substructures.
+    """Return the joint stiffness from FRFs of the assembly away from the joint and of both substructures.
 
     Parameters
     ----------
@@ -53,30 +53,35 @@ def decouple(
     h_a : array_like, shape (n_freq, n_a, n_a)
         Receptance of A, m/N.
     h_b : array_like, shape (n_freq, n_b, n_b)
-        Receptance of B.
+        Receptance of B, m/N.
     h_c : array_like, shape (n_freq, n, n)
-        Measured receptance of the assembly between the points that `equation` names.
+        Measured receptance of the assembly between the points of `equation`, m/N.
     dofs_j, dofs_k : array_like of int, shape (n,)
         Joint DOFs of A and of B, counted from 0, in the same order.
     dofs_r, dofs_s : array_like of int, shape (n,), optional
-        Internal DOFs r of A and s of B; needed where `equation` names the point.
+        Internal DOFs r of A and s of B; needed if `equation` contains the point.
     freq_hz, on_singular, out
-        As in `couple`.
+        Frequencies, Hz, treatment of singular lines, and array for the result; see `couple`.
 
     Returns
     -------
     ndarray, shape (n_freq, n, n)
-        K*, N/m.
+        Dynamic stiffness K*, N/m.
 
     Raises
     ------
     SingularLineError, ValueError
-        As in `couple`.
+        An error of `couple`.
+
+    See Also
+    --------
+    inverse_substructuring : K* from FRFs at the joint.
+    identify_model : fit of a joint to FRFs away from it.
 
     Notes
     -----
     All four are K* = (P M^-1 Q - H_jj - H_kk)^-1; for "ss", P = H_ks, M = H_ss - H_ss^C, Q = H_sk. They are exact
-    without noise and very sensitive to it, to the model of both substructures, and to the band.
+    without noise and very sensitive to it, to the models of both substructures, and to the band.
 
     Examples
     --------
@@ -114,24 +119,20 @@ def decouple(
 
 @dataclass(frozen=True, kw_only=True)
 class JointFrfs:
-    """What is known of a joint and its substructures; each method needs some of it.
+    """FRFs of a joint and its substructures; each method needs some of them.
 
     Attributes
     ----------
     gamma : array_like, shape (n_freq, 2 n, 2 n)
         Measured receptance of the assembly at joint DOFs j, then k, m/N.
     alpha : array_like, shape (n_freq, 2 n, 2 n)
-        Calculated receptance of the assembly with the first estimate at the same DOFs.
+        Calculated receptance of the assembly with the initial value K0 at the same DOFs, m/N.
     k_initial : array_like, shape (n_freq, n, n) or (n, n)
-        First estimate K0, N/m.
+        Initial value K0, N/m.
     h_a, h_b : array_like, shapes (n_freq, n_a, n_a), (n_freq, n_b, n_b)
-        Receptances of the substructures.
+        Receptances of the substructures, m/N.
     h_c : array_like, shape (n_freq, n, n)
-        Measured receptance of the assembly between the internal points that a decoupling equation names.
-    dofs_j, dofs_k : array_like of int, shape (n,)
-        Joint DOFs in `h_a` and in `h_b`, counted from 0.
-    dofs_r, dofs_s : array_like of int, shape (n,)
-        Internal DOFs in `h_a` and in `h_b`.
+        Measured receptance of the assembly between the internal points of a decoupling equation, m/N.
     """
 
     gamma: ArrayLike | None = None
@@ -152,9 +153,9 @@ class LineMethod(NamedTuple):
     Attributes
     ----------
     lines : callable
-        Takes what the method needs by keyword, then `freq_hz` and `on_singular`.
+        Function of the needed fields by keyword, then `freq_hz` and `on_singular`.
     measured : {"gamma", "h_c"}
-        Field of `JointFrfs` that is measured.
+        Name of the measured field of `JointFrfs`.
     model : tuple of str
         Fields that come from models.
     """
@@ -179,26 +180,27 @@ STIFFNESS_METHODS: Mapping[StiffnessMethod, LineMethod] = {
 def joint_stiffness(
     method: StiffnessMethod, frfs: JointFrfs, *, freq_hz: ArrayLike | None = None, on_singular: OnSingular = "raise"
 ) -> ComplexArray:
-    """Joint stiffness by one of the methods.
+    """Return the joint stiffness by one of the methods.
 
     Parameters
     ----------
     method : str
-        A key of `STIFFNESS_METHODS`: (2.47) with D_jk or D_kj, its short form -(gamma^-1)_jk, or (2.53)-(2.56).
+        Name of the method, a key of `STIFFNESS_METHODS`: (2.47) with D_jk or D_kj, its short form -(gamma^-1)_jk, or
+        (2.53)-(2.56).
     frfs : JointFrfs
-        At least what the method needs; the rest is not used.
+        FRFs, at least those that the method needs; further ones are ignored.
     freq_hz, on_singular
-        As in `couple`.
+        Frequencies, Hz, and treatment of singular lines; see `couple`.
 
     Returns
     -------
     ndarray, shape (n_freq, n, n)
-        K*, N/m.
+        Dynamic stiffness K*, N/m.
 
     Raises
     ------
     SingularLineError, ValueError
-        As in `couple`; a field that the method needs is missing.
+        An error of `couple`; a field that the method needs is missing.
 
     Examples
     --------
@@ -213,7 +215,7 @@ def joint_stiffness(
     own = STIFFNESS_METHODS[method]
     given = {name: getattr(frfs, name) for name in (own.measured, *own.model)}
     if any(value is None for value in given.values()):
-        # The measured FRFs are named only where they are missing themselves.
+        # The message names the measured FRFs only if they are missing themselves.
         needed = [name for name in given if name in own.model or given[name] is None]
         raise ValueError(f"method {method!r} needs {' and '.join(filter(None, (', '.join(needed[:-1]), needed[-1])))}")
     return own.lines(**given, freq_hz=freq_hz, on_singular=on_singular)

@@ -20,7 +20,7 @@ from jointfrf.kernel.call import N_FREQ, OnSingular, run
 
 __all__ = ["find_modification", "inverse_substructuring", "ismm", "modify"]
 
-#: Off-diagonal block of (2.48) that K* is taken from: rows of side j, or of side k.
+#: Off-diagonal block of (2.48) from which K* is taken: rows of side j, or of side k.
 Block = Literal["jk", "kj"]
 
 
@@ -33,7 +33,7 @@ def modify(
     on_singular: OnSingular = "raise",
     out: ComplexArray | None = None,
 ) -> ComplexArray:
-    """Receptance after a local modification.
+    """Return the receptance after a local modification.
 
     Parameters
     ----------
@@ -42,23 +42,27 @@ def modify(
     d : array_like, shape (n_freq, n_m, n_m) or (n_m, n_m)
         Dynamic stiffness added at the modified DOFs, Delta K - w^2 Delta M + i Delta H (2.32), N/m.
     dofs : array_like of int, shape (n_m,)
-        The modified DOFs, counted from 0.
+        Modified DOFs, counted from 0.
     freq_hz, on_singular, out
-        As in `couple`.
+        Frequencies, Hz, treatment of singular lines, and array for the result; see `couple`.
 
     Returns
     -------
     ndarray, shape (n_freq, n, n)
-        gamma.
+        Receptance gamma after the modification, m/N.
 
     Raises
     ------
     SingularLineError, ValueError
-        As in `couple`.
+        An error of `couple`.
+
+    See Also
+    --------
+    find_modification : the inverse.
 
     Notes
     -----
-    Eqs. (2.34)-(2.36) for all DOFs at once: gamma = alpha - alpha_:m (I + D alpha_mm)^-1 D alpha_m:. Misprint in
+    Eqs. (2.34)-(2.36) for all DOFs a at once: gamma = alpha - alpha_am (I + D alpha_mm)^-1 D alpha_ma. Misprint in
     (2.36): the second line must read gamma_um = alpha_um (I - D_mm gamma_mm); it has alpha_mu.
 
     Examples
@@ -95,7 +99,7 @@ def find_modification(
     alpha, gamma : array_like, shape (n_freq, n, n)
         Receptances before and after at the modified DOFs, m/N.
     freq_hz, on_singular, out
-        As in `couple`.
+        Frequencies, Hz, treatment of singular lines, and array for the result; see `couple`.
 
     Returns
     -------
@@ -105,7 +109,12 @@ def find_modification(
     Raises
     ------
     SingularLineError, ValueError
-        As in `couple`.
+        An error of `couple`.
+
+    See Also
+    --------
+    modify : the inverse.
+    ismm : K* of a joint by a modification.
 
     Notes
     -----
@@ -146,39 +155,44 @@ def ismm(
     on_singular: OnSingular = "raise",
     out: ComplexArray | None = None,
 ) -> ComplexArray:
-    """Joint stiffness K* = K0 + Delta by the inverse structural modification method.
+    """Return the joint stiffness K* = K0 + Delta by the inverse structural modification method.
 
     Parameters
     ----------
     alpha : array_like, shape (n_freq, 2 n, 2 n)
         Calculated receptance of the assembly with K0 at joint DOFs j, then k, m/N.
     gamma : array_like, shape (n_freq, 2 n, 2 n)
-        Measured receptance of the assembly at the same DOFs.
+        Measured receptance of the assembly at the same DOFs, m/N.
     k_initial : array_like, shape (n_freq, n, n) or (n, n)
-        First estimate K0, N/m.
+        Initial value K0, N/m.
     block : {"jk", "kj"}
-        Off-diagonal block that K* is taken from. Both hold the same joint; with measured FRFs, where gamma_jk and
-        gamma_kj have noise of their own, they are two estimates. They agree where gamma is symmetric. "kj" copies the
-        FRFs, sides exchanged.
+        Off-diagonal block from which K* is taken. Both contain the same joint and agree if gamma is symmetric. For
+        measured FRFs, gamma_jk and gamma_kj have separate noise, and the blocks are two estimates. "kj" copies the
+        FRFs, with the sides exchanged.
     freq_hz, on_singular, out
-        As in `couple`.
+        Frequencies, Hz, treatment of singular lines, and array for the result; see `couple`.
 
     Returns
     -------
     ndarray, shape (n_freq, n, n)
-        K*, N/m.
+        Dynamic stiffness K*, N/m.
 
     Raises
     ------
     SingularLineError, ValueError
-        As in `couple`.
+        An error of `couple`.
+
+    See Also
+    --------
+    inverse_substructuring : the same without a model.
+    identify_band_mean : mean of K* over bands.
 
     Notes
     -----
     Eqs. (2.47), (2.48): D = alpha^-1 (alpha - gamma) gamma^-1 contains -Delta twice off its diagonal, so that
-    K* = K0 - D_jk, and K* = K0 - D_kj. Only the block asked for is formed. Where alpha was assembled through K0,
-    substructures and first estimate cancel and the result is that of `inverse_substructuring`; with any other alpha (a
-    truncated modal model, say) it is not.
+    K* = K0 - D_jk, and K* = K0 - D_kj. Only the chosen block is formed. If alpha was assembled through K0,
+    substructures and initial value cancel, and the result equals `inverse_substructuring`. With any other alpha, such
+    as a truncated modal model, it does not.
 
     Examples
     --------
@@ -209,26 +223,31 @@ def inverse_substructuring(
     on_singular: OnSingular = "raise",
     out: ComplexArray | None = None,
 ) -> ComplexArray:
-    """Joint stiffness K* = -(gamma^-1)_jk: what ISMM reduces to, without model and first estimate.
+    """Return the joint stiffness K* = -(gamma^-1)_jk, to which ISMM reduces, without model and initial value.
 
     Parameters
     ----------
     gamma : array_like, shape (n_freq, 2 n, 2 n)
         Measured receptance of the assembly at joint DOFs j, then k, m/N.
-    block
-        As in `ismm`.
+    block : {"jk", "kj"}
+        Off-diagonal block from which K* is taken; see `ismm`.
     freq_hz, on_singular, out
-        As in `couple`.
+        Frequencies, Hz, treatment of singular lines, and array for the result; see `couple`.
 
     Returns
     -------
     ndarray, shape (n_freq, n, n)
-        K*, N/m.
+        Dynamic stiffness K*, N/m.
 
     Raises
     ------
     SingularLineError, ValueError
-        As in `couple`.
+        An error of `couple`.
+
+    See Also
+    --------
+    joint_compliance : K*^-1, with less bias by noise.
+    ismm : K* with a model.
 
     Notes
     -----

@@ -1,1 +1,1 @@
-"""TOML files read key by key: what is missing, wrong or unknown is one sentence that names file and key."""
+"""TOML files read key by key: a missing, wrong or unknown key is one sentence that names file and key."""

@@ -1,4 +1,4 @@
-"""Keys of a TOML table declared as a typed class: what is missing, unknown or wrong is one sentence."""
+"""Keys of a TOML table declared as a typed class: a missing, unknown or wrong key is one sentence."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ __all__ = ["Bands", "Declared", "DeclaredKey", "Keys", "NotNegative", "Positive"
 _T = TypeVar("_T")
 _K = TypeVar("_K", bound="Keys")
 
-#: How the sentence goes on that says what a value must be: "must be three numbers", "must be a number".
+#: Continuations of a sentence about a value: "must be three numbers", "must be a number".
 _NO_ARTICLE = ("one", "true", "the", "three")
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
@@ -50,28 +50,29 @@ def key(
     example: Any = None,
     **limits: Any,
 ) -> msgspec.Meta:
-    """Declare what a key means.
+    """Declare the meaning and form of a key.
 
     Parameters
     ----------
     meaning : str
-        What it is, in a few words.
+        Meaning in a few words.
     unit : str
-        Empty for pure numbers and texts.
+        Unit; empty for pure numbers and texts.
     takes : str
-        What its value must be, where the type does not say it.
+        Form of the value, if the type does not determine it.
     absent : str
-        What holds where the key is absent, where the default does not say it.
+        Consequence of an absent key, if the default does not show it.
     choice : collection of str
-        The texts that it takes, or that a list of it takes, where the type does not say them.
+        Texts that it accepts, or that a list of it accepts, if the type does not list them.
     pattern : str
-        Of a mapping: it holds all keys of the table that no other one names, of this form. ``DOF`` is any text.
+        Form of the names of a mapping, which contains all keys of the table that no other key names. ``DOF`` is any
+        text.
     holds : callable, optional
-        What must be true of the value beyond its type; `takes` says it.
+        Condition on the value beyond its type; `takes` describes it.
     example : object
-        For templates: a value, or a mapping from inner keys to values.
+        Value for templates, or a mapping from inner keys to values.
     **limits
-        Of `msgspec.Meta`: ``gt``, ``ge``, ``le``, ``min_length``.
+        Limits of `msgspec.Meta`: ``gt``, ``ge``, ``le``, ``min_length``.
     """
     facts = {"unit": unit, "takes": takes, "absent": absent, "choice": choice, "pattern": pattern,
             "holds": holds, "example": example}  # fmt: skip
@@ -97,33 +98,33 @@ class _KeysType(msgspec.StructMeta):
         return super().__new__(mcs, *parts, **{"kw_only": True, **options})
 
 
-# The same for type checkers.
+# The same declaration for type checkers.
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(msgspec.field,))
 class Keys(msgspec.Struct, metaclass=_KeysType, frozen=True, forbid_unknown_fields=True, dict=True):
-    """The keys of a table; the docstring of a subclass says what the table is for."""
+    """Keys of a table; the docstring of a subclass describes the table."""
 
-    #: Its heading in the reference, where its name does not say it.
+    #: Heading in the reference, if it differs from its name.
     header: ClassVar[str] = ""
-    #: What holds where the key is absent that distinguishes tables; empty if it is required.
+    #: Consequence of an absent key that distinguishes tables; empty if it is required.
     tag_absent: ClassVar[str] = ""
-    #: For templates: values of inner tables, by their names.
+    #: Values of inner tables for templates, by their names.
     examples: ClassVar[Mapping[str, Any]] = {}
 
     @property
     def table(self) -> TomlTable:
-        """The table from which the keys were read; one that is empty for keys that another process has sent."""
+        """Table from which the keys were read; empty for keys that another process has sent."""
         return self.__dict__.get("table_read") or TomlTable({}, type(self).__name__)
 
     def error(self, name: str, must: str) -> FileContentError:
-        """Return the exception that says what the value of a key must be."""
+        """Return the exception for a value of the wrong form."""
         return self.table.error(name, must)
 
     def wrong(self, name: str, why: str) -> FileContentError:
-        """Return the exception that says what is wrong with what a key names."""
+        """Return the exception for a wrong object that a key names."""
         return self.table.wrong(name, why)
 
     def missing(self, names: Collection[str], why: str = "") -> FileContentError:
-        """Return the exception that says that keys are missing, and what needs them."""
+        """Return the exception for missing keys, with the reason why they are needed."""
         return self.table.missing(list(names), why)
 
     def build(self, builder: Callable[[], _T], name: str = "") -> _T:
@@ -142,22 +143,27 @@ class DeclaredKey:
     Attributes
     ----------
     name, attribute : str
-        In the file, and of the class.
+        Names in the file and of the attribute.
     kind : type
-        Of the value, or of the elements of an array of tables.
+        Type of the value, or of the elements of an array of tables.
     tables : tuple of type
-        Subclasses of `Keys`: that of the table that it names, several that a tag distinguishes, or none.
+        Subclasses of `Keys`: the named table, several that a tag distinguishes, or none.
     is_array : bool
         Whether it names an array of tables.
     meaning, unit : str
+        Meaning and unit.
     takes : str
-        What its value must be.
+        Form of the value.
     absent : str
-        What holds where it is absent; empty if it is required.
+        Consequence of an absent key; empty if it is required.
     choice : collection of str
+        Accepted texts.
     pattern : str
+        Form of the names of a mapping.
     holds : callable or None
+        Condition on the value.
     example, default : object
+        Value for templates, and default value.
     """
 
     name: str
@@ -182,13 +188,13 @@ class DeclaredKey:
 
     @property
     def shown(self) -> str:
-        """Its name in messages and documents."""
+        """Name in messages and documents."""
         return self.pattern or self.name
 
 
 @dataclass(frozen=True)
 class Declared:
-    """The keys of a table, and the key that distinguishes the table from others in its place."""
+    """Keys of a table, and the key that distinguishes it from other tables in its place."""
 
     kind: type[Keys]
     tag_name: str
@@ -202,7 +208,7 @@ class Declared:
 
     @property
     def rest(self) -> DeclaredKey | None:
-        """The key that holds all that no other one names."""
+        """Key for all keys that no other one names."""
         return next((one for one in self.keys if one.pattern), None)
 
 
@@ -224,7 +230,7 @@ def _declared(name: str, attribute: str, hint: Any, default: Any) -> DeclaredKey
     facts: dict[str, Any] = {}
     limits: dict[str, float] = {}
     inner = _plain(hint, facts, limits)
-    if facts.get("pattern"):  # the facts hold for each value
+    if facts.get("pattern"):  # the facts are valid for each value
         facts = {**facts, **{k: v for k, v in _facts(get_args(inner)[1]).items() if not facts.get(k)}}
     is_array = get_origin(inner) is tuple and get_args(inner)[-1] is Ellipsis and bool(_tables(get_args(inner)[0]))
     tables = _tables(get_args(inner)[0] if is_array else inner)
@@ -263,7 +269,7 @@ def _tables(hint: Any) -> tuple[type[Keys], ...]:
 
 
 def _takes(hint: Any, facts: dict[str, Any], limits: dict[str, float]) -> str:
-    """Say what a value of a type must be."""
+    """Return the form of a value of a type in words."""
     if get_origin(hint) is Literal or (hint is str and facts.get("choice")):
         return "one of " + ", ".join(f"`{word}`" for word in get_args(hint) or facts["choice"])
     if get_origin(hint) is tuple:
@@ -293,14 +299,14 @@ def _shown(default: Any) -> str:
 
 @dataclass
 class _Findings:
-    """What is wrong in a file: unknown keys, missing ones by table, values."""
+    """Errors in a file: unknown keys, missing ones by table, values."""
 
     unknown: list[FileContentError] = field(default_factory=list)
     missing: dict[str, list[str]] = field(default_factory=dict)
     wrong: list[FileContentError] = field(default_factory=list)
 
     def check(self, where: str) -> None:
-        """Raise an error if something was found: all missing keys at once, else the first finding."""
+        """Raise an error if there are findings: all missing keys at once, else the first finding."""
         if self.unknown:
             raise self.unknown[0]
         if self.missing:
@@ -312,12 +318,12 @@ class _Findings:
 
 
 def read_keys(table: TomlTable, *kinds: type[_K]) -> _K:
-    """Read a table: the kind of keys that it must have, or one of several that a tag distinguishes.
+    """Return the keys of a table, of one kind, or of one of several kinds that a tag distinguishes.
 
     Raises
     ------
     FileContentError
-        There is an unknown key, there are missing ones, all of which are named, or a value is not what it must be.
+        There is an unknown key, keys are missing (the message names all), or a value has the wrong form.
     """
     findings = _Findings()
     found = _read(table, kinds, findings)
@@ -353,7 +359,7 @@ def _read(table: TomlTable, kinds: tuple[type[_K], ...], findings: _Findings) ->
 
 
 def _chosen(table: TomlTable, kinds: tuple[type[Keys], ...], findings: _Findings) -> Declared | None:
-    """Return the keys that a table must have, by its tag where there are several."""
+    """Return the keys that a table must have, by its tag if there are several."""
     declared = [keys_of(kind) for kind in kinds]
     if len(declared) == 1:
         return declared[0]
@@ -368,7 +374,7 @@ def _chosen(table: TomlTable, kinds: tuple[type[Keys], ...], findings: _Findings
 
 
 def _inside(one: DeclaredKey) -> str:
-    """Say which keys a missing table needs."""
+    """Return a text on the keys that a missing table needs."""
     if not one.tables:
         return ""
     declared = keys_of(one.tables[0])
@@ -379,7 +385,7 @@ def _inside(one: DeclaredKey) -> str:
 
 
 def _matches(pattern: str, name: str) -> bool:
-    """Whether a key has one of several forms: ``k_DOF, c_DOF``."""
+    """Return whether a key has one of several forms: ``k_DOF, c_DOF``."""
     return any(name.startswith(form.removesuffix("DOF")) and len(name) >= len(form) - 2 for form in pattern.split(", "))
 
 
@@ -420,7 +426,7 @@ def _leaf(table: TomlTable, one: DeclaredKey, hint: Any, name: str, findings: _F
         ):
             raise ValueError
         return found
-    except ValueError:  # that of msgspec is one
+    except ValueError:  # including errors of msgspec
         article = {"name": "the "}.get(first := one.takes.partition(" ")[0], "" if first in _NO_ARTICLE else "a ")
         words = one.choice or tuple(word for word in get_args(_plain(hint, {}, {})) if isinstance(word, str))
         similar = did_you_mean(value, words) if isinstance(value, str) else ""
@@ -429,7 +435,7 @@ def _leaf(table: TomlTable, one: DeclaredKey, hint: Any, name: str, findings: _F
 
 
 def _is_finite(value: Any) -> bool:
-    """Whether all numbers of a value are finite; a whole number in TOML may have any number of digits."""
+    """Return whether all numbers of a value are finite; a whole number in TOML may have any number of digits."""
     if isinstance(value, list):
         return all(map(_is_finite, value))
     return not isinstance(value, int | float) or abs(value) <= sys.float_info.max

@@ -1,4 +1,4 @@
-"""What is written from declared keys: a reference in Markdown, a template with comments, a JSON Schema for editors."""
+"""Documents from declared keys: a reference in Markdown, a template with comments, a JSON Schema for editors."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from jointfrf.toml.declared import DeclaredKey, Keys, keys_of
 
 __all__ = ["key_reference", "key_template", "schema_of"]
 
-#: Columns of a template before a comment.
+#: Column of the comments in a template.
 _COMMENT = 34
-#: Numbers from here on are written with an exponent.
+#: Size above which numbers have an exponent.
 _LARGE = 1e6
 
 
@@ -38,7 +38,7 @@ def key_reference(tops: Mapping[str, type[Keys]]) -> str:
 
 
 def _inner_tables(top: type[Keys], inside: str = "") -> Iterator[tuple[str, type[Keys]]]:
-    """Give all tables inside another, each once, with their names in a file."""
+    """Yield all tables inside another, each once, with their names in a file."""
     found: dict[type[Keys], list[str]] = {}
     for one in keys_of(top).keys:
         name = one.name if inside else f"[[{one.name}]]" if one.is_array else f"[{one.name}]"
@@ -56,7 +56,7 @@ def _about(table: type[Keys]) -> str:
 
 
 def _filled(text: str) -> str:
-    """Fill a paragraph to lines of the width of other documents."""
+    """Return a paragraph filled to the line width of other documents."""
     return textwrap.fill(text, 120, break_long_words=False, break_on_hyphens=False)
 
 
@@ -65,7 +65,7 @@ def _rows(table: type[Keys]) -> str:
     rows: list[tuple[str, ...]] = [("key", "value", "unit", "if absent", "meaning"), ("---",) * 5]
     if declared.tag_name:
         rows.append(
-            (f"`{declared.tag_name}`", f'`"{declared.tag}"`', "", table.tag_absent or "required", "What it is.")
+            (f"`{declared.tag_name}`", f'`"{declared.tag}"`', "", table.tag_absent or "required", "Kind of the table.")
         )
     for one in declared.keys:
         names = ", ".join(f"`{name}`" for name in one.shown.split(", "))
@@ -79,10 +79,11 @@ def key_template(top: type[Keys], first_line: str = "", examples: Mapping[str, A
     Parameters
     ----------
     top : type
+        Keys of the file.
     first_line : str
-        What the file begins with.
+        First line of the file.
     examples : mapping, optional
-        Values of inner tables, by their names; those of `top` by default.
+        Values of inner tables, by their names; by default the examples of `top`.
     """
     given = top.examples if examples is None else examples
     declared = keys_of(top)
@@ -98,7 +99,7 @@ def key_template(top: type[Keys], first_line: str = "", examples: Mapping[str, A
 
 
 def _tables(one: DeclaredKey, given: Any) -> Iterator[tuple[str, str] | None]:
-    """Give the lines of a table, or of an array of tables, each code and comment; an optional one is all comment."""
+    """Yield the lines of a table, or of an array of tables, each code and comment; an optional one is all comment."""
     example = one.example if given is None else given
     mark = "" if one.is_required or example is not None else "# "
     for number, own in enumerate(example if isinstance(example, list) else [example or {}]):
@@ -114,7 +115,7 @@ def _tables(one: DeclaredKey, given: Any) -> Iterator[tuple[str, str] | None]:
 
 
 def _values(table: type[Keys], example: Mapping[str, Any], with_meaning: bool = True) -> Iterator[tuple[str, str]]:
-    """Give code and comment for each value of a table."""
+    """Yield code and comment for each value of a table."""
     declared = keys_of(table)
     for one in declared.keys:
         if one.tables:
@@ -154,7 +155,7 @@ def _line(code: str, comment: str) -> str:
 
 
 def _written(value: Any) -> str:
-    """Write a value as TOML has it."""
+    """Return a value in TOML."""
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{_key(name)} = {_written(each)}" for name, each in value.items()) + " }"
     if isinstance(value, list | tuple):
@@ -181,7 +182,7 @@ def schema_of(top: type[Keys]) -> dict[str, Any]:
 
 
 def _complete(content: dict[str, Any], table: type[Keys]) -> None:
-    """Add what the types do not say: choices of texts, keys of a free form, a kind that need not be named."""
+    """Add rules beyond the types: choices of texts, keys of a free form, a kind that need not be named."""
     if table.tag_absent:
         content["required"].remove(keys_of(table).tag_name)
     for one in keys_of(table).keys:

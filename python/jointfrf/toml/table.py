@@ -1,4 +1,4 @@
-"""A TOML table and where it stands: what is missing, wrong or unknown in it is one sentence that names file and key."""
+"""A TOML table and its place: a missing, wrong or unknown key in it is one sentence that names file and key."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from jointfrf.spelling import look_alike
 __all__ = ["TomlTable", "missing_in_words", "read_toml"]
 
 _T = TypeVar("_T")
-#: A longer name is not repeated in a message.
+#: Length above which a name is not repeated in a message.
 _LONG = 1000
 
 
@@ -35,11 +35,11 @@ def read_toml(path: Path) -> TomlTable:
     except OSError as error:
         raise FileContentError(f"{path} cannot be read: {error.strerror}; check the file") from error
     except (ValueError, RecursionError) as error:
-        raise FileContentError(f"{path}: not a TOML file: {error}; correct it") from error
+        raise FileContentError(f"{path} is not a TOML file ({error}); correct it") from error
 
 
 def missing_in_words(names: Sequence[str]) -> str:
-    """Say that keys are missing; names as they are to be read."""
+    """Return a text on missing keys, with their names in the file."""
     one = len(names) == 1
     return f"the key{'' if one else 's'} {', '.join(names)} {'is' if one else 'are'} missing"
 
@@ -63,31 +63,31 @@ class TomlTable:
     folder: Path = Path()
 
     def unknown(self, key: str, names: Sequence[str]) -> FileContentError:
-        """Return the exception that says which keys there are instead of an unknown one."""
+        """Return the exception for an unknown key, with the existing keys."""
         similar = look_alike(key, names)
         hint = f"; did you mean {similar!r}?" if similar else ""
         return FileContentError(f"{self.where}: unknown key {key!r}; use one of {', '.join(names)}{hint}")
 
     def missing(self, names: Sequence[str], why: str = "") -> FileContentError:
-        """Return the exception that says that keys are missing, and what needs them."""
+        """Return the exception for missing keys, with the reason why they are needed."""
         needed = missing_in_words(list(map(repr, names)))
         return FileContentError(f"{self.where}: {needed}" + (f": {why}" if why else ""))
 
     def error(self, key: str, must: str, similar: str = "") -> FileContentError:
-        """Return the exception that says what the value of a key must be, and what may have been meant."""
+        """Return the exception for a value of the wrong form, with a proposal."""
         given = reprlib.repr(self.content.get(key))
         return FileContentError(f"{self.where}: {key} must be {must}, not {given}{similar}")
 
     def wrong(self, key: str, why: str) -> FileContentError:
-        """Return the exception that says what is wrong with what a key names."""
+        """Return the exception for a wrong object that a key names."""
         return FileContentError(f"{self.where}: {key}: {why}")
 
     def check_stated(self, key: str, size: float) -> None:
-        """Check the bytes of memory that a number asks for against the limit of reading; raises FileContentError."""
+        """Check the memory that a number requires, in bytes, against the limit of reading; raise FileContentError."""
         check_stated(f"{self.where}: {key} = {reprlib.repr(self.content.get(key))}", size)
 
     def build(self, builder: Callable[[], _T], key: str = "") -> _T:
-        """Call a builder; if it complains, the message names the table and, if given, the key.
+        """Call a builder; if it raises an error, the message names the table and, if given, the key.
 
         Raises
         ------

@@ -334,7 +334,7 @@ def test_a_joint_is_transferred_to_another_part(tmp_path):
     words = ["validate", "a.toml", tmp_path / "long.toml", tmp_path / "test.npz", *COUPLE[3:]]
     result = run_command(*words)
     assert result.returncode == 0, result.stderr
-    assert "regenerated beside measured: 8 FRFs, 20 to 400 Hz" in result.stdout
+    assert "regenerated and measured: 8 FRFs, 20 to 400 Hz" in result.stdout
     assert "not in the parts, and not compared: 999:+y" in result.stdout
     content = json.loads(run_command(*words, "--json").stdout)
     assert content["difference"][1][2] is None

@@ -105,7 +105,7 @@ NPZ = [
     (lambda path: path.write_bytes(b""), r"mass: \S+a_m\.npz (is empty|cannot be read as an NPZ file: )"),
     (lambda path: path.write_bytes(b"PK\3\4" + b"x" * 50), r"a_m\.npz cannot be read as an NPZ file: "),
     (lambda path: path.write_bytes(path.read_bytes()[:300]), r"a_m\.npz cannot be read as an NPZ file: "),
-    (lambda path: np.savez(path, np.array([{}], object)), r"a_m\.npz holds Python objects \(arr_0\.npy\), which"),
+    (lambda path: np.savez(path, np.array([{}], object)), r"a_m\.npz contains Python objects \(arr_0\.npy\), which"),
     (
         lambda path: np.savez(path, a=K, b=K),
         r"a_m\.npz must contain one array, or one called 'mass'; it contains a, b$",
@@ -185,7 +185,7 @@ def test_a_bad_file_of_dofs(by_matrices, text, message):
             'file = "b.uff"\nquantity = "x"',
             r"quantity must be one of receptance, mobility, ",
         ),
-        ('k = ["1:y", "1:rz"]', 'k = ["1:y", "1:theta"]', r"\[points\]: '1:theta' is no channel: expected a node"),
+        ('k = ["1:y", "1:rz"]', 'k = ["1:y", "1:theta"]', r"\[points\]: '1:theta' is no channel; write a node"),
         (
             'k = ["1:y", "1:rz"]',
             'k = ["1:y", "1:-y"]',

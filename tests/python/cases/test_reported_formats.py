@@ -31,7 +31,7 @@ READ = [
     ),
 ]
 REJECTED = [
-    ("07-*/give-spectrum-alone.mat", MASSES, "holds no FRF, but functions (1 of type FrequencySpectrum); export FRFs"),
+    ("07-*/give-spectrum-alone.mat", MASSES, "no FRF, but functions (1 of type FrequencySpectrum); export FRFs"),
     ("08-*/give-four-functions.mat", MASSES, "has no direction of node 101 in its responses; give --map direction=z"),
     ("10-*/give.uff", ARM, "number them apart by --map components=frame:0,arm:1000"),
     ("11-*/give.uff", MASSES, "it names no response direction (code 0); give --map direction=z"),

@@ -82,7 +82,7 @@ def test_a_link_in_the_folder_of_results_is_not_followed(tmp_path, monkeypatch):
     (tmp_path / "home").mkdir()
     (tmp_path / "results" / "3.1-discrete").mkdir(parents=True)
     (tmp_path / "results" / "3.1-discrete" / "tables").symlink_to(tmp_path / "home")
-    with pytest.raises(jf.FileContentError, match="tables is a link or no folder, not a folder of its own"):
+    with pytest.raises(jf.FileContentError, match="tables is a link or no folder, not a folder"):
         run_case(find_case("3.1"), realisations=2)
     assert not list((tmp_path / "home").iterdir())
 
@@ -94,7 +94,7 @@ def test_a_new_case_is_written_through_no_link(tmp_path, kind, schema):
     (tmp_path / "new" / schema).symlink_to(tmp_path / "thesis.txt")
     done = run_command("new", kind, tmp_path / "new")
     assert done.returncode == 1
-    assert f"{schema} is a link, not a file of its own: remove it" in done.stderr
+    assert f"{schema} is a link, not a file; remove it" in done.stderr
     assert (tmp_path / "thesis.txt").read_text() == "of the user"
     assert [path.name for path in (tmp_path / "new").iterdir()] == [schema]
 

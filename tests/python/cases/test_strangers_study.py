@@ -71,7 +71,7 @@ def rejected(study: Path, message: str, home: Path, count: int = N) -> None:
 def test_chunks_are_written_into_no_other_folder(study, home):
     shutil.rmtree(study / "chunks")
     (study / "chunks").symlink_to(home)
-    rejected(study, "chunks is a link or no folder, not a folder of its own: remove it", home)
+    rejected(study, "chunks is a link or no folder, not a folder; remove it", home)
     (study / "chunks").unlink()
     (study / "chunks").write_text("no folder")
     rejected(study, "chunks is a link or no folder", home)
@@ -83,7 +83,7 @@ def test_a_chunk_that_is_a_link_is_rejected(study, home, name):
     first = chunks_of(study)[0]
     first.unlink()
     first.symlink_to(home / name)
-    rejected(study, f"{first.name} is a link, not a file of its own: remove it", home)
+    rejected(study, f"{first.name} is a link, not a file; remove it", home)
 
 
 def test_a_chunk_that_links_to_another_study_is_not_copied(study, begun, home):
@@ -98,7 +98,7 @@ def test_a_chunk_that_links_to_another_study_is_not_copied(study, begun, home):
 def test_a_record_that_is_a_link_is_rejected(study, home, name):
     (study / "study.json").unlink()
     (study / "study.json").symlink_to(home / name)
-    rejected(study, r"study.json is a link, not a file of its own: remove it", home)
+    rejected(study, r"study.json is a link, not a file; remove it", home)
 
 
 def test_a_record_that_links_to_one_is_not_replaced(study, begun, home):
@@ -117,7 +117,7 @@ def test_values_go_through_no_link(study, home, kind, name):
     (study / f"realisations.{kind}").symlink_to(home / name)
     done = run_command(*WORDS, "--realisations", N, "--out", study, "--values", kind)
     assert done.returncode == 1
-    assert f"realisations.{kind} is a link, not a file of its own: remove it" in done.stderr
+    assert f"realisations.{kind} is a link, not a file; remove it" in done.stderr
     assert content_of(home) == before
     (study / f"realisations.{kind}").unlink()
     assert jf.read_study(study).save_values(kind).stat().st_size
@@ -153,7 +153,7 @@ def test_a_pipe_is_not_waited_for(study, home):
     first = chunks_of(study)[0]
     shutil.move(first, study / "kept")
     os.mkfifo(first)  # has no size: it was taken for a chunk that is not there
-    rejected(study, f"{first.name} is a pipe or a device, not a file of its own", home)
+    rejected(study, f"{first.name} is a pipe or a device, not a file", home)
     first.unlink()
     shutil.move(study / "kept", first)
     (study / "study.json").unlink()

@@ -134,7 +134,7 @@ def test_the_loss_factor_of_the_material_is_that_of_the_model():
         (dict(divisions=(1, 2, 2.5)), "divisions along z must be a whole number, at least 1, not 2.5"),
         (dict(divisions=(1, 2, np.nan)), "divisions along z must be finite"),
         (dict(origin=(0, 0)), r"origin must have shape \(3\)"),
-        (dict(origin=(0, 0, np.inf)), "origin holds NaN or Inf"),
+        (dict(origin=(0, 0, np.inf)), "origin contains NaN or Inf"),
         (dict(hole=jf.Hole(0.29, 0.0045, 0.0105)), "hole at 290 mm with its ring of radius 10.5 mm"),
         (dict(hole=jf.Hole(0.4, 0.0045, 0.0065)), "hole at 400 mm .* leaves the beam of 300 x 25 mm"),
         (dict(hole=jf.Hole(-0.01, 0.0045, 0.0065)), "hole at -10 mm .* leaves the beam"),

@@ -95,7 +95,7 @@ def test_a_line_on_an_undamped_resonance_is_singular(method):
         (dict(outputs=[12]), "outputs names DOF 12"),
         (dict(loss_factor=np.nan), "loss_factor must be finite"),
         (dict(freq_hz=[1.0, -2.0]), "line 1 is -2 Hz"),
-        (dict(freq_hz=[1.0, np.inf]), "freq_hz holds NaN or Inf at index"),
+        (dict(freq_hz=[1.0, np.inf]), "freq_hz contains NaN or Inf at index"),
         (dict(method="krylow"), "method must be one of"),
         (dict(mass=None), "mass is missing"),
     ],
@@ -540,10 +540,10 @@ def test_a_bad_line_of_a_sparse_sweep_leaves_the_others():
     [
         (np.ones((2, 11)), ValueError, r"outputs must be DOFs, or weights of shape \(m, 12\), not \(2, 11\)"),
         (sparse.csr_array((2, 11)), ValueError, r"outputs must be DOFs, or weights of shape \(m, 12\), not \(2, 11\)"),
-        (np.full((1, 12), np.nan), ValueError, "outputs holds NaN or Inf"),
-        (sparse.csr_array(np.full((1, 12), np.inf)), ValueError, "outputs holds NaN or Inf"),
-        (1j * np.ones((1, 12)), TypeError, "outputs must hold real numbers, not complex128"),
-        (sparse.csr_array(1j * np.ones((1, 12))), TypeError, "outputs must hold real numbers, not complex128"),
+        (np.full((1, 12), np.nan), ValueError, "outputs contains NaN or Inf"),
+        (sparse.csr_array(np.full((1, 12), np.inf)), ValueError, "outputs contains NaN or Inf"),
+        (1j * np.ones((1, 12)), TypeError, "outputs must contain real numbers, not complex128"),
+        (sparse.csr_array(1j * np.ones((1, 12))), TypeError, "outputs must contain real numbers, not complex128"),
         (np.ones((1, 12, 1)), TypeError, "outputs must be a list of DOF numbers"),
         ([0.5], TypeError, "outputs must be a list of DOF numbers"),
     ],
@@ -563,7 +563,7 @@ def test_half_a_symmetric_matrix_is_refused_and_completed_when_asked(side, name,
     whole = {"stiffness": k + k.T, "mass": m + m.T, "damping": c + c.T}
     half = np.tril if side == "lower" else np.triu
     given = {key: kind(half(x) if key == name else x) for key, x in whole.items()}
-    with pytest.raises(ValueError, match=f"{name} holds its {side} triangle only.*from_triangle"):
+    with pytest.raises(ValueError, match=f"{name} contains its {side} triangle only.*from_triangle"):
         jf.receptance(FREQ, **given)
     given[name] = jf.from_triangle(given[name])
     np.testing.assert_allclose(jf.receptance(FREQ, **given), jf.receptance(FREQ, **whole), rtol=1e-10)
@@ -578,7 +578,7 @@ def test_a_whole_matrix_is_not_completed():
 
 @pytest.mark.parametrize("dtype", [object, "U32"])
 def test_matrices_that_hold_no_numbers_get_one_sentence(dtype):
-    with pytest.raises(TypeError, match="stiffness must hold real numbers, not"):
+    with pytest.raises(TypeError, match="stiffness must contain real numbers, not"):
         jf.receptance(FREQ, np.eye(2).astype(dtype), np.eye(2))
 
 
@@ -598,5 +598,5 @@ def test_a_model_takes_names_of_dofs():
 
 
 def test_a_model_has_a_name_for_each_dof():
-    with pytest.raises(ValueError, match="dofs must name 2 different DOFs, those of stiffness, not 1"):
+    with pytest.raises(ValueError, match="dofs must name 2 different DOFs of stiffness, not 1"):
         jf.Model(np.eye(2), np.eye(2), ("1:x",))

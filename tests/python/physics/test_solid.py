@@ -243,7 +243,7 @@ END = at_end(MESH, LENGTH)
         ({"p": ([0, 0, 0], END), "q": ([0, 0, 1], END)}, [], "patch 'q' overlaps patch 'p' at x, y, z = -10, 0, 100"),
         ({"p": ([0, 0, 0], END)}, END, "patch 'p' overlaps the clamped nodes at x, y, z = -10, 0, 100 mm"),
         ({"p": ([0, 0], END)}, [], r"point of patch 'p' must have shape \(3\), not \(2,\)"),
-        ({"p": ([0, 0, np.nan], END)}, [], "point of patch 'p' holds NaN or Inf"),
+        ({"p": ([0, 0, np.nan], END)}, [], "point of patch 'p' contains NaN or Inf"),
         ({"p": ([0, 0, 0], [0, 1, 24])}, [], "patch 'p' names node 24; there are nodes 0 to 23"),
         ({"p": ([0, 0, 0], [0, 1, -1])}, [], "patch 'p' names node -1; there are nodes 0 to 23"),
         ({"7": ([0, 0, 0], END)}, [], "a patch cannot be named '7': a name without colon that is not a number"),

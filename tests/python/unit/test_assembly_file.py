@@ -307,7 +307,7 @@ def without(*lines: str) -> str:
         (ASSEMBLY + '"33:+z" = "B/2:x"\n', "22:.x and 33:.z of test.uff are one DOF, B/2:x"),
         (ASSEMBLY.split("[channels]")[0], "no response of test.uff is a DOF of A or B; name them under"),
         (ASSEMBLY.replace('law = "spring"', 'law = "sprung"'), r"\[joint\]: \[\[law\]\] number 1: law must be one of"),
-        (ASSEMBLY.replace('dof = "x"', 'dof = "theta"'), "2:x stands where the joint has theta"),
+        (ASSEMBLY.replace('dof = "x"', 'dof = "theta"'), "2:x is at the place of theta of the joint"),
         (ASSEMBLY + '[response_gains]\n"A/2:x" = 0.1\n', "A/2:x: unknown channel; use one of A/1:x, B/2:x"),
         (ASSEMBLY + '[[ground]]\ndof = "A/7:x"\nstiffness = 1.0\n', "attachment 'A/7:x': neither A nor B has such"),
         (ASSEMBLY + '[[mass]]\ndofs = ["A/1:x"]\n', r"\[\[mass\]\] number 1: the key 'mass' is missing"),
@@ -334,7 +334,9 @@ height = 0.006
 """
     laws = '[[joint.law]]\ndof = "{}"\nlaw = "spring"\n' * 2
     text = f'[A]\n{beam}joint = ["5:y", "5:theta"]\n[B]\n{beam}joint = ["1:y", "1:theta"]\n' + laws.format("theta", "y")
-    with pytest.raises(FileContentError, match="5:y stands where the joint has theta: its DOFs are, in this order"):
+    with pytest.raises(
+        FileContentError, match="5:y is at the place of theta of the joint; its DOFs are, in this order"
+    ):
         jf.measured_assembly(written(tmp_path, text + '[channels]\n"11:+x" = "A/2:y"\n'), frfs)
 
 

@@ -123,7 +123,7 @@ def test_joint_matrices():
         lambda: jf.Joint([np.nan]),
         lambda: jf.Joint(np.ones((2, 3))),
     ):
-        with pytest.raises(ValueError, match=r"must|holds"):
+        with pytest.raises(ValueError, match=r"must|contains"):
             wrong()
 
 

@@ -382,7 +382,7 @@ def changed(element, place, node):
             r"element 1 \(centre 0.5, 0.5, 0.5 m\) .* near its node 1; number nodes 1 to 4",
         ),
         (NODES * [1, 1, 0], ELEMENTS, r"element 1 \(centre 0.5, 0.5, 0 m\) is turned inside out or flat"),
-        (np.where(NODES == 3, np.nan, NODES), ELEMENTS, r"nodes holds NaN or Inf at index \(12, 2\)"),
+        (np.where(NODES == 3, np.nan, NODES), ELEMENTS, r"nodes contains NaN or Inf at index \(12, 2\)"),
         (NODES[:, :2], ELEMENTS, r"nodes must have shape \(n, 3\)"),
         (NODES, ELEMENTS[:, :7], r"elements must be node numbers of shape \(n, 8\), not int64 of shape \(3, 7\)"),
         (NODES, ELEMENTS + 0.5, "elements must be node numbers .* not float64"),

@@ -233,7 +233,7 @@ def test_only_lines_in_the_bands_are_used(beams):
         (dict(damping="friction"), "damping must be one of"),
         (dict(cross="all"), "cross must be one of"),
         (dict(noise=-1.0), "noise must be positive"),
-        (dict(noise=np.zeros((158, 4, 4))), "noise must hold positive variances"),
+        (dict(noise=np.zeros((158, 4, 4))), "noise must contain positive variances"),
         (dict(transform=np.eye(3)), r"transform must have shape \(n, 4\)"),
         (dict(transform=np.ones((3, 4))), "even number of rows"),
         (dict(freq_hz=np.arange(5.0)), r"freq_hz must have shape \(158\)"),

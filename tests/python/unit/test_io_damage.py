@@ -184,10 +184,10 @@ def test_stated_sizes_that_exceed_the_file(tmp_path):
     with h5py.File(path, "r+") as file:
         del file["h"]
         file.create_dataset("h", shape=(10**12, 3, 2), dtype="c16", chunks=(1000, 3, 2))
-    assert "is damaged: /h does not hold the 1000000000000 x 3 x 2 values that it states" in refused(path)
+    assert "is damaged: /h does not contain the 1000000000000 x 3 x 2 values that it states" in refused(path)
     path = tmp_path / "huge.uff"
     path.write_bytes(function(n_values=999_999_999))
-    assert "holds 3 of 999999999 values" in refused(path)
+    assert "has 3 of 999999999 values" in refused(path)
     path.write_bytes(function(binary=True, n_values=999_999_999))
     assert "of 999999999 values" in refused(path)
     path = tmp_path / "huge.mat"
@@ -238,7 +238,7 @@ def test_damaged_texts_of_an_hdf5_file(tmp_path):
 def test_python_objects_are_not_read(tmp_path):
     path = tmp_path / "objects.npz"
     np.savez(path, freq=FREQ_HZ, h=np.array([{"a": 1}], dtype=object))
-    assert "holds Python objects (h.npy), which could run any program; save plain arrays" in refused(path)
+    assert "contains Python objects (h.npy), which could run any program; save plain arrays" in refused(path)
 
 
 def test_numbers_of_the_other_byte_order(tmp_path):
@@ -323,13 +323,13 @@ def test_mixed_files(tmp_path):
     with pytest.warns(FileContentWarning, match=r"not read, no FRF: time history .* \(datasets 2, 5\)"):
         np.testing.assert_allclose(read_frfs(path).h[:, 0, 0], VALUES)
     path.write_bytes(b"".join(others))
-    assert "holds 1 time history" in refused(path)
+    assert "contains 1 time history" in refused(path)
     path = tmp_path / "mixed.mat"
     signal = structure_of_testlab(GIVEN, type_="Signal", values=GIVEN.h.real)
     write_mat(path, Signal=signal, FRF=structure_of_testlab(GIVEN, label="m/s^2/N"), text="März", n=3)
     with pytest.warns(FileContentWarning, match=r"not read, no FRF: functions \(1 of type Signal\)"):
         np.testing.assert_array_equal(read_frfs(path).h, GIVEN.h)
-    assert "holds no FRF" in refused(write_mat(path, Signal=signal))
+    assert "contains no FRF" in refused(write_mat(path, Signal=signal))
     assert "has no field for the frequencies" in refused(write_mat(path, text="März", n=3))
 
 

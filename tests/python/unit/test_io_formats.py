@@ -60,10 +60,10 @@ def test_the_content_tells_the_format(tmp_path, name):
 @pytest.mark.parametrize("name", WRITERS)
 def test_writers_refuse_what_cannot_be_read(tmp_path, name):
     h = frf_set().h.copy()
-    with pytest.raises(ValueError, match="holds no FRF"):
+    with pytest.raises(ValueError, match="contains no FRF"):
         WRITERS[name](tmp_path / name, frf_set(h=np.full(h.shape, np.nan)))
     h[2, 1, 1] = np.nan
-    with pytest.raises(ValueError, match=r"FRF 102:-y / 201:\+y holds NaN or Inf, first at 30 Hz"):
+    with pytest.raises(ValueError, match=r"FRF 102:-y / 201:\+y contains NaN or Inf, first at 30 Hz"):
         WRITERS[name](tmp_path / name, frf_set(h=h))
     assert not list(tmp_path.iterdir())
 
@@ -285,7 +285,7 @@ def test_only_functions_of_the_right_type_are_read(tmp_path, write):
         each.strip("()") for each in left_out.split(", ")
     }
     with pytest.raises(
-        FileContentError, match=r"holds no FRF, but functions \(1 of type FrequencySpectrum\); export FRFs"
+        FileContentError, match=r"contains no FRF, but functions \(1 of type FrequencySpectrum\); export FRFs"
     ):
         read_frfs(write(tmp_path / "b.mat", A=spectrum))
 
@@ -310,7 +310,7 @@ def test_functions_without_directions_or_names(tmp_path, write):
         FileContentError, match=r"give mapping responses=\.\.\., one name for each of 6, or one for all"
     ):
         read_frfs(nameless)
-    with pytest.raises(FileContentError, match=r"holds 6 functions of a kind, and mapping responses= has 2 names"):
+    with pytest.raises(FileContentError, match=r"contains 6 functions of a kind, and mapping responses= has 2 names"):
         read_frfs(nameless, mapping={"responses": "1:x,2:x", "excitations": "1:x"})
 
 
@@ -389,7 +389,7 @@ def test_structure_arrays_by_path_and_index(tmp_path, write):
         ({"h": "FRdata.R"}, r"FRdata\.R is a group; use one of FRdata\.R\(1\)\.force"),
         ({"h": "FRdata.R(:).name"}, "the FRFs are not numbers"),
         ({"h": "FRdata.R(:).none"}, r"FRdata\.R\(:\)\.none names no arrays of one size \(none\)"),
-        ({"freq_hz": "10:df"}, "'df' in mapping freq_hz= is neither a number nor a field with one number"),
+        ({"freq_hz": "10:df"}, "'df' in mapping freq_hz= is not a number or a field with one number"),
         ({"freq_hz": "10:0"}, "freq_hz=10:0 is not like 5:0.5, first frequency and spacing in Hz"),
         ({"freq_hz": "10:-1"}, "freq_hz=10:-1 is not like 5:0.5"),
         ({"freq_hz": "10:1e-9:1000"}, "are no whole number of lines of the named channels"),
@@ -401,7 +401,7 @@ def test_structure_arrays_by_path_and_index(tmp_path, write):
         ),
         (
             {"h": None, "real": "FRdata.R(1).force", "imag": "FRdata.R(1).size"},
-            r"R\(1\)\.force holds no real numbers, which mapping real= takes",
+            r"R\(1\)\.force contains no real numbers, which mapping real= takes",
         ),
     ],
 )
@@ -456,7 +456,7 @@ def test_one_frf_that_is_not_finite_leaves_the_others(tmp_path):
     h = given.h.copy()
     h[0] = np.nan
     path = write_mat(tmp_path / "a.mat", **(FIELDS | {"H": h, "f": FREQ_HZ - 10}))
-    with pytest.warns(FileContentWarning, match=r"line at 0 Hz holds NaN or Inf in 101:\+x / 101:\+x, .* is left out"):
+    with pytest.warns(FileContentWarning, match=r"at 0 Hz contains NaN or Inf in 101:\+x / 101:\+x, .* is left out"):
         np.testing.assert_array_equal(read_frfs(path).h, given.h[1:])
 
 
@@ -590,7 +590,7 @@ def test_coherence_in_a_file_of_its_own(tmp_path):
     found = read_frfs(tmp_path / "frf.uff", tmp_path / "coherence.uff")
     same(found, given, rtol=1e-11)
     np.testing.assert_array_equal(found.coherence, given.coherence)
-    with pytest.raises(FileContentError, match=r"holds 6 coherences .* and no FRF"):
+    with pytest.raises(FileContentError, match=r"contains 6 coherences .* and no FRF"):
         read_frfs(tmp_path / "coherence.uff")
     with pytest.raises(FileContentError, match="there is no FRF"):
         read_frfs(tmp_path / "coherence.uff", tmp_path / "coherence.uff")
@@ -625,7 +625,7 @@ def test_text_tables_without_channels(tmp_path):
     for change, message in (
         ({"responses": None, "excitations": None}, "or give mapping responses= and excitations="),
         ({"excitations": None}, r"mapping names responses only; give mapping excitations=\.\.\. too"),
-        ({"responses": "1:x,2:x"}, "holds 6 functions of a kind, and mapping responses= has 2 names"),
+        ({"responses": "1:x,2:x"}, "contains 6 functions of a kind, and mapping responses= has 2 names"),
         ({"responses": "1:x", "excitations": "1:x"}, r"mapping names 1:\+x / 1:\+x twice; name each FRF once"),
     ):
         with pytest.raises(FileContentError, match=message):

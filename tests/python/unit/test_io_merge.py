@@ -156,7 +156,7 @@ def test_coherence_of_a_file_is_read(write):
     ("wrong", "message"),
     [
         ({"values": np.array([0.5, 0.75, 1.5])}, "coherence left out: it is not from 0 to 1"),
-        ({"freq_hz": FREQ_HZ + 1}, "coherence left out: its frequency lines are not those of the FRFs"),
+        ({"freq_hz": FREQ_HZ + 1}, "coherence left out: its frequency lines differ from the lines of the FRFs"),
         ({"response": (0, 2)}, "coherence left out: it names no response node"),
     ],
 )
@@ -184,5 +184,5 @@ def test_nodes_that_are_wanted(write):
     path = write(*(function(response=(i, 2), reference=(j, 2)) for i in (1, 2, 3) for j in (1, 2, 3)))
     frf = read_uff(path, nodes=[1, 3])
     assert [channel.node for channel in frf.responses] == [1, 3]
-    with pytest.raises(FileContentError, match=r"holds no FRF between nodes 8, 9"):
+    with pytest.raises(FileContentError, match=r"contains no FRF between nodes 8, 9"):
         read_uff(path, nodes=[8, 9])

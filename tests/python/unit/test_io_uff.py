@@ -236,9 +236,9 @@ def test_coordinates_that_cannot_be_trusted_are_said(write):
         ({"values": VALUES.real, "number_type": 4}, "real numbers, without phase"),
         (
             {"function_type": 1},
-            r"holds 1 time history \(dataset 58, function type 1\) and no FRF; estimate FRFs .*pyFRF",
+            r"contains 1 time history \(dataset 58, function type 1\) and no FRF; estimate FRFs .*pyFRF",
         ),
-        ({"function_type": 99}, "holds 1 function of another kind"),
+        ({"function_type": 99}, "contains 1 function of another kind"),
     ],
 )
 def test_a_function_that_is_no_usable_frf_is_left_out(write, wrong, message):
@@ -255,8 +255,8 @@ def test_a_function_that_is_no_usable_frf_is_left_out(write, wrong, message):
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"n_values": 7}, r"dataset 1 \(1:\+y / 1:\+y\) holds 3 of 7 values"),
-        ({"n_values": 1}, "holds 3 of 1 values"),
+        ({"n_values": 7}, r"dataset 1 \(1:\+y / 1:\+y\) has 3 of 7 values"),
+        ({"n_values": 1}, "has 3 of 1 values"),
         ({"number_type": 8}, "is damaged: ordinate data type 8 in dataset 1"),
         ({"freq_hz": [5.0, 5.0, 5.0], "even": False}, "do not increase"),
         ({"freq_hz": [-1.0, 0.0, 1.0]}, "do not increase from 0 Hz"),
@@ -279,7 +279,7 @@ def test_numbers_in_a_foreign_binary_form_are_refused(write):
 def test_nan_at_0_hz_costs_that_line_only(write):
     bad = np.array([np.nan, 1.0 + 0j, 2.0])
     path = write(function(freq_hz=[0.0, 1.0, 2.0]), function(bad, freq_hz=[0.0, 1.0, 2.0], response=(2, 2)))
-    with pytest.warns(FileContentWarning, match=r"0 Hz holds NaN or Inf in 2:\+y / 1:\+y and is left out"):
+    with pytest.warns(FileContentWarning, match=r"0 Hz contains NaN or Inf in 2:\+y / 1:\+y and is left out"):
         frfs = read_uff(path)
     assert frfs.freq_hz.tolist() == [1.0, 2.0]
     assert np.isfinite(frfs.h).all()
@@ -348,7 +348,7 @@ def test_directions_and_names_that_the_file_lacks_are_stated_by_the_user(write):
     found = read_frfs(nameless, mapping={"responses": "11:x,12:x,13:-y", "excitations": "11:x"})
     assert [str(each) for each in (*found.responses, *found.excitations)] == ["11:+x", "12:+x", "13:-y", "11:+x"]
     np.testing.assert_array_equal(found.h[0, :, 0], VALUES[0] * np.arange(1, 4))
-    with pytest.raises(FileContentError, match=r"holds 3 functions of a kind, and mapping responses= has 2 names"):
+    with pytest.raises(FileContentError, match=r"contains 3 functions of a kind, and mapping responses= has 2 names"):
         read_frfs(nameless, mapping={"responses": "11:x,12:x", "excitations": "11:x"})
     with pytest.raises(ValueError, match=r"direction 'q' is none of .*; correct mapping direction="):
         read_frfs(path, mapping={"direction": "q"})
@@ -379,9 +379,9 @@ def test_zeros_that_fill_the_last_line_are_no_values(write):
     filled = content.removesuffix(b"\n    -1\n") + 2 * zeros + b"\n    -1\n"
     np.testing.assert_array_equal(read_uff(write(filled)).h[:, 0, 0], values)
     one_more = filled.replace(2 * zeros + b"\n", zeros + zeros[:13] + b"%13.5e\n" % 1.0)
-    with pytest.raises(FileContentError, match="holds 9 of 7 values"):
+    with pytest.raises(FileContentError, match="has 9 of 7 values"):
         read_uff(write(one_more))
-    with pytest.raises(FileContentError, match="holds 10 of 7 values"):
+    with pytest.raises(FileContentError, match="has 10 of 7 values"):
         read_uff(write(content.removesuffix(b"    -1\n") + 3 * zeros + b"\n    -1\n"))
 
 
@@ -448,7 +448,7 @@ def test_a_lost_delimiter_is_noticed(write):
         (b"(1.0+2.0j)\n", r"is not a Universal File: no dataset delimiters \(-1\)"),
         (bytes(range(256)), "is not a Universal File"),
         (b"    -1\n    -1\n", "has no type"),
-        (dataset(15).encode(), r"holds dataset 15 \(nodes\) and no FRF"),
+        (dataset(15).encode(), r"contains dataset 15 \(nodes\) and no FRF"),
         (dataset(58).encode(), r"dataset 1 \(type 58\): it cannot be read"),
         (dataset(164, "x").encode() + function(), r"dataset 1 \(type 164\): it cannot be read"),
         (function() + units(0.0, 1.0).encode(), r"test.uff has the length factor 0 in its units \(dataset 2\)"),

@@ -157,7 +157,7 @@ def test_dofs_may_stand_in_the_order_of_the_frfs(sides):
     [
         (jf.LawJoint({"y": jf.SpringLaw(1.0)}, rigid=["theta"], mass={"y": 0.1}), {}, "joint has a mass in y"),
         (jf.LawJoint({}, rigid=["y", "theta"]), {}, "all DOFs are rigid"),
-        (JOINTS["zener"][1], {"dofs": ["y", "z"]}, "dofs must name those of joint"),
+        (JOINTS["zener"][1], {"dofs": ["y", "z"]}, "dofs must be the DOFs of joint"),
         (JOINTS["zener"][1], {"damping": "viscous"}, "damping and cross do not go with joint"),
         (JOINTS["zener"][1], {"cross": "zero"}, "damping and cross do not go with joint"),
         (jf.LawJoint({"y": jf.SpringLaw(1.0)}), {}, "dofs must name 2"),

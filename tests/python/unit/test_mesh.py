@@ -180,7 +180,7 @@ def test_a_node_is_found_by_its_place():
     [
         (lambda: rectangle([0, 1], [0]), "x must contain at least two grid lines in ascending order"),
         (lambda: rectangle([0, 2, 1], [0, 1]), "z must contain at least two grid lines in ascending order"),
-        (lambda: rectangle([0, 1], [0, np.nan]), "x holds NaN or Inf"),
+        (lambda: rectangle([0, 1], [0, np.nan]), "x contains NaN or Inf"),
         (lambda: extrude((rectangle([0, 1], [0, 1]), [1, 0])), "heights must contain at least two values in ascending"),
         (
             lambda: holed_rectangle((0, 0), (2, 2, 1), (0.4, 0.3), 4),

@@ -664,9 +664,9 @@ def test_a_model_is_never_built_beyond_the_limits_of_its_unknowns():
 @pytest.mark.parametrize(
     ("of_part", "of_joint", "message"),
     [
-        (["4:y", "4:theta"], ["theta", "y"], "a: 4:y stands where the joint has theta"),
-        (["4:theta", "4:y"], ["y", "theta_z"], "a: 4:theta stands where the joint has y"),
-        (["4:theta", "4:y"], ["Fy", "Mz"], "a: 4:theta stands where the joint has Fy"),
+        (["4:y", "4:theta"], ["theta", "y"], "a: 4:y is at the place of theta of the joint"),
+        (["4:theta", "4:y"], ["y", "theta_z"], "a: 4:theta is at the place of y of the joint"),
+        (["4:theta", "4:y"], ["Fy", "Mz"], "a: 4:theta is at the place of Fy of the joint"),
         (["4:y", "4:theta"], ["y", "theta_z"], ""),
         (["4:y", "4:theta"], ["Fy", "Mtheta_z"], ""),
         (["4:y", "4:theta"], ["x", "theta_z"], ""),  # axes of its own
@@ -692,5 +692,5 @@ def test_directions_that_are_exchanged_are_refused(way):
     one, swapped = [f"1:{way}", f"1:{other}"], [f"1:{other}", f"1:{way}"]
     joint = jf.LawJoint({way: jf.SpringLaw(1e6), other: jf.SpringLaw(2e6)})
     jf.Assembly(jf.Substructure(arm, one), jf.Substructure(arm, one), joint)
-    with pytest.raises(ValueError, match=f"b: 1:{other} stands where the joint has {way}"):
+    with pytest.raises(ValueError, match=f"b: 1:{other} is at the place of {way} of the joint"):
         jf.Assembly(jf.Substructure(arm, one), jf.Substructure(arm, swapped), joint)

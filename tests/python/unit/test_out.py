@@ -124,9 +124,9 @@ def read_only(a):
     ("make", "error", "message"),
     [
         (lambda: [[0.0]], TypeError, "out must be a numpy array, not list"),
-        (lambda: np.zeros((5, 3, 3)), ValueError, "out must hold complex128, not float64"),
-        (lambda: np.zeros((5, 3, 3), "c8"), ValueError, "out must hold complex128, not complex64"),
-        (lambda: np.zeros((5, 3, 3), ">c16"), ValueError, "out must hold complex128, not >c16"),
+        (lambda: np.zeros((5, 3, 3)), ValueError, "out must contain complex128, not float64"),
+        (lambda: np.zeros((5, 3, 3), "c8"), ValueError, "out must contain complex128, not complex64"),
+        (lambda: np.zeros((5, 3, 3), ">c16"), ValueError, "out must contain complex128, not >c16"),
         (lambda: np.zeros((4, 3, 3), complex), ValueError, r"out must have shape \(5, 3, 3\), not \(4, 3, 3\)"),
         (lambda: np.zeros((5, 9), complex), ValueError, r"out must have shape \(5, 3, 3\), not \(5, 9\)"),
         (lambda: np.zeros((5, 3, 3), complex, "F"), ValueError, "out must be contiguous in C order and aligned"),

@@ -122,7 +122,7 @@ def test_frfs_made_reciprocal_are_told_from_measured_ones(beams):
     [
         (NoiseOptions(-0.1), "noise must be positive, not -0.1"),
         (NoiseOptions(0.0), "noise must be positive, not 0"),
-        (NoiseOptions(np.zeros((158, 4, 4))), "noise must hold positive variances"),
+        (NoiseOptions(np.zeros((158, 4, 4))), "noise must contain positive variances"),
         (NoiseOptions(np.ones((158, 4))), "noise must have shape"),
         (NoiseOptions(0.01, averages=4), "coherence and averages are used where noise is not given"),
         (
@@ -208,5 +208,5 @@ def test_words_are_checked_when_they_are_chosen():
 
 
 def test_damping_by_dof_needs_a_word_for_each(beams):
-    with pytest.raises(ValueError, match="damping must hold one word for each of 2 DOFs, not 1"):
+    with pytest.raises(ValueError, match="damping must have one word for each of 2 DOFs, not 1"):
         prepared(beams, options=FitOptions(("viscous",), "zero", True))

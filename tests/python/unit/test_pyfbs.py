@@ -272,7 +272,7 @@ def test_time_data_and_objects_are_no_frfs(tmp_path):
         jf.io.read_frfs(tmp_path / "t.npy")
     np.save(tmp_path / "o.npy", np.array([FREQ, "a"], dtype=object), allow_pickle=True)
     with pytest.raises(
-        FileContentError, match=r"o\.npy holds Python objects \(its array\), which could run any program"
+        FileContentError, match=r"o\.npy contains Python objects \(its array\), which could run any program"
     ):
         jf.io.read_frfs(tmp_path / "o.npy")
 

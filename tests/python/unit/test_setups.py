@@ -81,7 +81,7 @@ def test_merging_keeps_which_frf_came_from_which_setup(tmp_path):
         np.testing.assert_array_equal(read.repeats, merged.setups.repeats)
         np.testing.assert_array_equal(read.repeated, merged.setups.repeated)
         assert (read.gain, read.common_gain) == (None, 0.0)
-    with pytest.warns(FileContentWarning, match="does not hold which FRF came from which set-up"):
+    with pytest.warns(FileContentWarning, match="does not contain the set-up of each FRF"):
         write_frfs(tmp_path / "merged.csv", merged)
 
 
@@ -115,14 +115,14 @@ def test_other_frfs_are_no_repetition():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"of": [[0, 2]]}, "of must hold numbers of 2 set-ups"),
-        ({"of": [0, 1]}, "of must hold whole numbers in rows and columns"),
-        ({"of": [[0.5, 1]]}, "of must hold whole numbers"),
+        ({"of": [[0, 2]]}, "of must contain numbers of 2 set-ups"),
+        ({"of": [0, 1]}, "of must contain whole numbers in rows and columns"),
+        ({"of": [[0.5, 1]]}, "of must contain whole numbers"),
         ({"gain": -0.1}, "gain must not be negative"),
         ({"common_gain": -0.1}, "common_gain must not be negative"),
         ({"repeats": [[0, 0, 0]]}, "repeats and repeated go together"),
-        ({"repeats": [[0, 3, 0]], "repeated": np.ones((4, 1))}, "repeats must hold numbers of responses"),
-        ({"repeats": [[0, 0, 0]], "repeated": np.ones((4, 2))}, "repeated must hold numbers in 1 columns"),
+        ({"repeats": [[0, 3, 0]], "repeated": np.ones((4, 1))}, "repeats must contain numbers of responses"),
+        ({"repeats": [[0, 0, 0]], "repeated": np.ones((4, 2))}, "repeated must contain numbers in 1 columns"),
         ({"names": []}, "names must name at least one"),
     ],
 )

@@ -163,7 +163,7 @@ def test_mounts_that_are_not_separated_are_named_with_the_sum_that_is_known():
     [
         ({"same": [["fl", "up"]]}, "there are fl, fr, rl, rr"),
         ({"same": [["fl", "fr"], ["fr", "rl"]]}, "already in a group"),
-        ({"alike": {"fl": jf.Alike(["rl", "rr"], 0.1)}}, "a name of its own"),
+        ({"alike": {"fl": jf.Alike(["rl", "rr"], 0.1)}}, "a group needs a new name"),
     ],
 )
 def test_groups_that_are_none(groups, said):
@@ -178,13 +178,13 @@ def test_what_is_no_assembly_of_parts():
         jf.PlacedJoint(START, ["machine/fl:x"])
     part = jf.Substructure(jf.chain([1.0], [], ground="none"))
     spring = jf.Joint([1.0], dofs=["x"])
-    with pytest.raises(ValueError, match="no joint holds b"):
+    with pytest.raises(ValueError, match="no joint has the part b"):
         jf.Assembly.of_parts({"a": part, "b": part}, {"bolt": jf.PlacedJoint(spring, ["a/1:x"])})
     with pytest.raises(ValueError, match="none of a has such a DOF"):
         jf.Assembly.of_parts({"a": part}, {"bolt": jf.PlacedJoint(spring, ["a/2:x"])})
     with pytest.raises(TypeError, match="alike: 'mounts' must be"):
         machine({name: START for name in FEET}, alike={"mounts": ["fl", "fr"]})
-    with pytest.raises(ValueError, match="a, b and with_joint are those of two parts"):
+    with pytest.raises(ValueError, match="a, b and with_joint need exactly two parts"):
         machine({name: START for name in FEET}).with_joint(START)
-    with pytest.raises(TypeError, match="inertia must hold real numbers"):
+    with pytest.raises(TypeError, match="inertia must contain real numbers"):
         jf.rigid_body(1.0, [1.0, "x"], {})

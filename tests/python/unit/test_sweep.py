@@ -97,7 +97,7 @@ def test_other_number_types_are_converted(dtype):
 
 @pytest.mark.parametrize("wrong", [np.array([[["a"]]]), np.array([[[None]]], dtype=object)])
 def test_what_is_no_number_is_a_type_error(wrong):
-    with pytest.raises(TypeError, match="a must hold numbers"):
+    with pytest.raises(TypeError, match="a must contain numbers"):
         jf.invert(wrong)
 
 
@@ -165,7 +165,7 @@ def test_every_scale_from_1e_minus_150_to_1e150(random_lines):
     ("call", "message"),
     [
         (lambda g: jf.invert(g[0]), r"a must have shape \(n_freq, n, n\), not \(4, 4\)"),
-        (lambda g: jf.invert(g[:, :2]), "a must hold square matrices, not 2 x 4"),
+        (lambda g: jf.invert(g[:, :2]), "a must contain square matrices, not 2 x 4"),
         (lambda g: jf.solve(g, g[:2]), r"b must have shape \(3, 4, n\)"),
         (lambda g: jf.invert(g, freq_hz=[1.0]), r"freq_hz must have shape \(3\)"),
         (lambda g: jf.invert(g, on_singular="ignore"), "on_singular must be one of raise, nan"),
@@ -177,7 +177,7 @@ def test_every_scale_from_1e_minus_150_to_1e150(random_lines):
         (lambda g: jf.couple(g, g, np.eye(0), [], []), "at least one"),
         (lambda g: jf.modify(g, np.eye(1), []), "at least one DOF"),
         (lambda g: jf.ismm(g, g[:, :2, :2], np.eye(2)), "gamma must have the shape of alpha"),
-        (lambda g: jf.ismm(g[:, :3, :3], g, np.eye(2)), "alpha must hold DOFs j and k, an even number of rows, not 3"),
+        (lambda g: jf.ismm(g[:, :3, :3], g, np.eye(2)), "must contain DOFs j and k, an even number of rows, not 3"),
         (lambda g: jf.inverse_substructuring(np.zeros((3, 0, 0))), "an even number of rows, not 0"),
         (lambda g: jf.find_modification(g, g[:, :2, :2]), "gamma must have the shape of alpha"),
         (lambda g: jf.decouple("rk", g, g, g[:, :1, :1], [0], [0]), "equation must be one of rr, rs, sr, ss"),

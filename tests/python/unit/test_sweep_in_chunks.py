@@ -134,7 +134,7 @@ def test_a_singular_line_is_named_by_its_number_in_the_sweep(lines):
 def test_ill_conditioned_lines_are_told_once(lines):
     lines[600:1300] = np.diag([1.0, 1e-15, 1.0])
     with pytest.warns(
-        jf.IllConditionedWarning, match="counted from line 512; so are lines of 1 other chunk"
+        jf.IllConditionedWarning, match="counted from line 512; 1 other chunks have such lines, too"
     ) as reported:
         jf.sweep(jf.invert, {"a": lines}, np.empty_like(lines), plan=plan_of(512), jobs=1)
     assert len(reported) == 1

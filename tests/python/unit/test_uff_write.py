@@ -100,7 +100,7 @@ def test_an_frf_with_a_bad_line_is_refused_and_the_older_file_stays(tmp_path, va
     (tmp_path / "test.uff").write_text("older")
     bad = frfs()
     bad.h[3, 1, 1] = value
-    with pytest.raises(ValueError, match=r"FRF 3:-rz / 3:-rz holds NaN or Inf, first at 5\.3 Hz"):
+    with pytest.raises(ValueError, match=r"FRF 3:-rz / 3:-rz contains NaN or Inf, first at 5\.3 Hz"):
         write_uff(tmp_path / "test.uff", bad)
     assert [path.read_text() for path in tmp_path.iterdir()] == ["older"]
     bad.h[:] = np.nan

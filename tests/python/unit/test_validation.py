@@ -78,7 +78,7 @@ def test_a_band_without_peak_has_no_frequency_error():
         (dict(outputs=[4]), ValueError, "outputs"),
         (dict(responses=["a"]), ValueError, "must name 4 rows and 4 columns of measured"),
         (dict(band=(20, 30)), ValueError, "20"),
-        (dict(measured=np.full((200, 4, 4), np.nan)), ValueError, "measured holds no FRF in the band"),
+        (dict(measured=np.full((200, 4, 4), np.nan)), ValueError, "measured contains no FRF in the band"),
         (dict(dofs_b=[7]), ValueError, "dofs_b"),
         (dict(forces=3), TypeError, "forces must"),
     ],

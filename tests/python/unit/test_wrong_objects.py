@@ -21,7 +21,7 @@ FREQ = np.arange(1.0, 6.0)
         (lambda h: jf.impact_consistency(h, h), "point must be a VirtualPoint, not ndarray"),
         (lambda h: jf.channel_geometry(h, {}), "channel must be a str, not ndarray"),
         (lambda h: jf.elastic_centre(h), "joint must be a Joint, not ndarray"),
-        (lambda h: jf.as_bands(None, ["x"], None), "freq_hz must hold real numbers, not object"),
+        (lambda h: jf.as_bands(None, ["x"], None), "freq_hz must contain real numbers, not object"),
     ],
 )
 def test_the_argument_is_named(random_lines, call, message):
@@ -117,7 +117,7 @@ def realised(**options):
         (lambda: jf.solid_model(BRICK, STEEL, clamped=[0, [1, 2]]), "clamped must be an array of numbers"),
         (lambda: jf.io.frfs_of_arrays([1.0], [[[1.0]]], [[[1.0] * 99] * 9], ["1:x"]), r"has .* in its responses"),
         (lambda: jf.rigid_offset(np.array([["x"]]), [0, 0, 0]), "dofs must be a sequence of names, not"),
-        (lambda: jf.as_bands({}, ["a\nb"], FREQUENCIES), r"dofs must hold names without line breaks, not 'a\\nb'"),
+        (lambda: jf.as_bands({}, ["a\nb"], FREQUENCIES), r"dofs must contain names without line breaks, not 'a\\nb'"),
         (lambda: jf.StudyDesign([1]), "factors must be a Mapping, not list"),
         (lambda: jf.StudyDesign({"noise": None}), "factor 'noise' is None; give a list of values"),
         (lambda: jf.StudyDesign({"noise": "0.1"}), "factor 'noise' is '0.1'; give a list of values"),
@@ -139,8 +139,8 @@ def realised(**options):
         (lambda: fitted_law(dofs=np.zeros((2, 2))), "dofs must be a sequence of names, not"),
         (lambda: fitted_law(cross=np.zeros(2)), "do not go with joint, which states the laws"),
         (lambda: jf.write_joint("a\nb", jf.Joint([1.0])), r"name a file that ends in .toml, not 'a\\nb'"),
-        (lambda: half_model().modes(), "stiffness holds its upper triangle only"),
-        (lambda: half_model().natural_frequencies(1), "stiffness holds its upper triangle only"),
+        (lambda: half_model().modes(), "stiffness contains its upper triangle only"),
+        (lambda: half_model().natural_frequencies(1), "stiffness contains its upper triangle only"),
         (lambda: turned_model().modes(), "stiffness is not symmetric: the model has no real modes"),
         (lambda: jf.beam(1, 3, youngs_modulus=1, density=1, width=1, height=1, poisson=-1), "poisson must lie between"),
         (lambda: jf.merge_studies("one", "all"), "parts is 'one'; give a list of folders"),

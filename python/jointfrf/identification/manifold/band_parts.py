@@ -1,4 +1,4 @@
-"""Separate fits of parts of the band, where lines that contradict the joint found are left out of its fit."""
+"""Separate fits of parts of the band, if lines that contradict the joint were omitted from its fit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["BandParts", "fit_band_parts", "left_out_share"]
 
-#: Parts of the band that are fitted separately.
+#: Number of parts of the band that are fitted separately.
 _PARTS = 4
 #: Probability at which parts disagree.
 _DISAGREE = 1e-3
@@ -26,14 +26,14 @@ class BandParts(NamedTuple):
     Attributes
     ----------
     spans : tuple of (low, high)
-        Hz.
+        Parts of the band, Hz.
     values : ndarray, shape (n_parts, p)
-        Parameters of each part; NaN where it does not show one.
+        Parameters of each part; NaN if the part does not determine one.
     disagree : ndarray of bool, shape (p,)
-        Parameters on which the parts do not agree.
+        Parameters on which the parts disagree.
     std_error : ndarray, shape (p,)
-        Standard deviation between the parts where they do not agree, 0 elsewhere; of the compliance where a joint
-        without cross terms has a stiffness.
+        Standard deviation between the parts if they disagree, else 0; for a stiffness of a joint without cross terms,
+        the standard deviation of its compliance.
     """
 
     spans: tuple[tuple[float, float], ...]
@@ -43,7 +43,7 @@ class BandParts(NamedTuple):
 
 
 def left_out_share(found: JointEstimate) -> float:
-    """Return the largest share of lines that do not fit the joint found, over the groups fitted on the manifold."""
+    """Return the largest share of lines that do not fit the joint, over the groups fitted on the manifold."""
     shares = [float(np.mean(~group.used)) for group in found.groups if group.unknown_cross is None]
     return max(shares, default=0.0)
 
@@ -56,19 +56,19 @@ def fit_band_parts(
     Parameters
     ----------
     found : JointEstimate
-        Of all lines.
+        Estimate from all lines.
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     factor : ndarray, shape (p,)
-        By how much variances exceed those from independent noise, scatter between lines and parts left out.
+        Ratio of the variances to the variances by independent noise, without scatter between lines and parts.
     fit : callable
-        From numbers of lines to their estimate.
+        Function from numbers of lines to their estimate.
 
     Notes
     -----
-    Lines that do not fit the joint found are left out of a fit, and with them what contradicts it: the residual stays
-    that of the noise, and no scatter shows. Parts of the band find joints of their own. They disagree where the squares
-    of their differences from the weighted mean, over their variances, are improbable for noise.
+    A fit omits lines that do not fit the joint, and with them the contradiction: the residual equals the noise, and
+    there is no scatter. Each part of the band has a separate estimate. The parts disagree if the squares of their
+    differences from the weighted mean, over their variances, are improbable for noise.
     """
     in_compliance = np.zeros(factor.size, bool)
     for group in found.groups:

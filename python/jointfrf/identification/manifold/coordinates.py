@@ -2,8 +2,8 @@
 
 Everything is a function of R = (K* + Z)^-1, the compliance of the joint in parallel with reference springs Z. A joint
 without cross terms is fitted in a = 1/(k + z) and the rates eta = h a and tau = c a of each DOF, which are regular for
-a rigid DOF, a = 0, and for a free one, a = 1/z. One with cross terms is fitted in the entries of K*, one of laws in
-their parameters.
+a rigid DOF, a = 0, and for a free one, a = 1/z. The coordinates of a joint with cross terms are the entries of K*, and
+the coordinates of laws are their parameters.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ _KINDS: Mapping[DampingTerms, tuple[ParameterKind, ...]] = {
 }
 #: Rates eta and w tau are limited: K* is then damping only.
 _LARGEST_RATE = 100.0
-#: Relative standard error of a compliance from which on intervals come from the profile of the likelihood.
+#: Relative standard error of a compliance above which intervals come from the profile of the likelihood.
 _CURVED = 0.1
-#: Of a compliance with this relative error, damping is not known: its rate is taken below 1 where it is linearised.
+#: Relative error of a compliance above which its damping is unknown: its rate is limited to 1 in the linearisation.
 _HARDLY = 0.3
 
 
@@ -60,15 +60,15 @@ class JointTerms(NamedTuple):
     Attributes
     ----------
     parameters : tuple of Parameter, length p
-        By kind, k before h before c, and within a kind the diagonal first.
+        Parameters by kind, k before h before c, and within a kind the diagonal first.
     omega : ndarray, shape (n_freq,)
-        rad/s.
+        Angular frequencies, rad/s.
     kinds : ndarray of int, shape (q,)
-        0, 1, 2 for k, h, c: the functions of frequency 1, i, i w.
+        Kind of each term, 0, 1, 2 for k, h, c: the functions of frequency 1, i, i w.
     pairs : ndarray of int, shape (q, 2)
         Row and column of each term in K*.
     shared : ndarray of int, shape (q,)
-        The parameter that each term is: q = p, in one order, but for points whose joints are equal.
+        Parameter of each term: q = p in one order, unless points have equal joints.
     """
 
     parameters: tuple[Parameter, ...]
@@ -89,7 +89,7 @@ class JointTerms(NamedTuple):
 
     @property
     def is_shared(self) -> bool:
-        """Whether a parameter is that of several points."""
+        """Whether a parameter belongs to several points."""
         return self.shared.size > len(self.parameters)
 
     @property
@@ -108,7 +108,7 @@ class JointTerms(NamedTuple):
         return self._replace(omega=self.omega[lines])
 
     def of_dofs(self, dofs: NDArray[np.intp]) -> tuple[JointTerms, NDArray[np.intp]]:
-        """Return the terms between some of the DOFs, and which of the parameters these are."""
+        """Return the terms between some of the DOFs, and the numbers of their parameters."""
         place = np.full(self.n, -1)
         place[dofs] = np.arange(dofs.size)
         terms = np.flatnonzero((place[self.pairs] >= 0).all(axis=1))
@@ -117,7 +117,7 @@ class JointTerms(NamedTuple):
         return JointTerms(parameters, self.omega, self.kinds[terms], place[self.pairs[terms]], shared.ravel()), which
 
     def without_cross_terms(self) -> tuple[JointTerms, NDArray[np.intp]]:
-        """Return the terms of single DOFs, each its own parameter, and which of the parameters each was."""
+        """Return the terms of single DOFs with separate parameters, and the number of the parameter of each."""
         own = np.flatnonzero(self.pairs[:, 0] == self.pairs[:, 1])
         common = self.shared[own]
         parameters = tuple(self.parameters[i] for i in common)
@@ -140,20 +140,20 @@ def joint_terms(
     cross: CrossTerms,
     same: Sequence[Sequence[str]] = (),
 ) -> JointTerms:
-    """Return the terms of K*(w) = k + i h + i w c asked for.
+    """Return the chosen terms of K*(w) = k + i h + i w c.
 
     Parameters
     ----------
     omega : ndarray, shape (n_freq,)
-        rad/s.
+        Angular frequencies, rad/s.
     dofs : sequence of str
         Names of the n joint DOFs.
     damping : str, or sequence of str of length n
-        Damping terms of all DOFs, or of each. A cross term has those that both its DOFs have.
+        Damping terms of all DOFs, or of each. A cross term has the terms that both its DOFs have.
     cross : {"zero", "ignore", "points", "fit"}
-        Symmetric cross terms are parameters where it is "fit", and between DOFs of one point where it is "points".
+        Choice of symmetric cross terms: "fit" makes all of them parameters, "points" only those within a point.
     same : sequence of sequence of str
-        Points whose joints are equal.
+        Points with equal joints.
     """
     of_dof = [damping] * len(dofs) if isinstance(damping, str) else list(damping)
     place = {dof: i for i, dof in enumerate(dofs)}
@@ -180,6 +180,7 @@ class SpringJoint(JointCoordinates):
     Parameters
     ----------
     terms : JointTerms
+        Terms of K*.
     springs : ndarray, shape (n,), optional
         Reference springs Z, N/m or N m/rad; none by default.
     """
@@ -199,8 +200,8 @@ class SpringJoint(JointCoordinates):
 class DiagonalJoint(SpringJoint):
     """A joint without cross terms: R_dd = a_d / (1 + i eta_d + i w tau_d); entries of R are its diagonal.
 
-    With `by_rate` false the coordinates of damping are h and c themselves, R_dd = a_d / (1 + i a_d h_d + i w a_d
-    c_d): for the profile of their likelihood.
+    With `by_rate` false the coordinates of damping are h and c, R_dd = a_d / (1 + i a_d h_d + i w a_d c_d), for the
+    profile of their likelihood.
     """
 
     in_compliance = True
@@ -287,7 +288,7 @@ class DiagonalJoint(SpringJoint):
 
     @property
     def kernel_terms(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """DOF of each coordinate, counted from 1, and its kind, as the kernel takes them."""
+        """DOF of each coordinate, counted from 1, and its kind, as arguments of the kernel."""
         return (self.dofs + 1).astype(np.int32), self.terms.kinds.astype(np.int32)
 
     def minimise(
@@ -299,7 +300,7 @@ class DiagonalJoint(SpringJoint):
     def lowest(
         self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = LEAST_GAIN
     ) -> FormMinimum:
-        """Minimise; where a DOF ends rigid or all damping, also from no damping and from some."""
+        """Minimise; if a DOF ends rigid or with damping only, also from no damping and from some."""
         return self._minimised("lowest_diagonal_joint", forms, start, held, least_gain)
 
     def _minimised(
@@ -313,15 +314,15 @@ class DiagonalJoint(SpringJoint):
         cost, _ = call_for_number(routine, args)
         return FormMinimum(x, cost, information, gradient, forms, self)
 
-    def within_sight(self, minimum: FormMinimum, x: FloatArray) -> FloatArray:
-        """Return where to linearise: no nearer to a rigid joint, nor at a larger rate, than the data resolve."""
+    def linearisation_point(self, minimum: FormMinimum, x: FloatArray) -> FloatArray:
+        """Return coordinates for a linearisation: rigidity and rates are limited to the resolution of the data."""
         n, own = self.n, self.is_compliance[: self.n]
         error = np.sqrt(np.maximum(np.diagonal(minimum.covariance), TINY))
         hardly = own & ~(error[:n] <= _HARDLY * x[:n])
         of_rate = hardly[self.dofs[n:]]
         at = x.copy()
         if hardly.any():
-            # The size of C itself: of a DOF that is mostly damping, the compliance alone may be anything.
+            # Size of C itself: if a DOF is mostly damping, the compliance alone may be arbitrary.
             size = abs(self.compliance(x)).mean(axis=0)
             at[n:][of_rate] = 0.0
             slope = self.slope(at, self.compliance(at))
@@ -334,22 +335,22 @@ class DiagonalJoint(SpringJoint):
         return at
 
     def may_be_rigid(self, i: int) -> bool:
-        """Whether a parameter is of a DOF whose coordinate is its compliance."""
+        """Return whether the coordinate of a parameter's DOF is its compliance."""
         return bool(self.is_compliance[self.dofs[i]])
 
     def has_profile(self, i: int, x: FloatArray, covariance: FloatArray) -> bool:
-        """Whether the compliance of the DOF of a parameter has a large error."""
+        """Return whether the compliance of a parameter's DOF has a large error."""
         a = self.dofs[i]
         return bool(np.sqrt(max(covariance[a, a], 0)) > _CURVED * x[a])
 
     def of_profile(self, i: int) -> DiagonalJoint:
-        """Return the coordinates of a profile: damping itself where its own is asked for."""
+        """Return the coordinates of a profile: h or c instead of the rate for a damping parameter."""
         if self.is_stiffness[i] == self.by_rate:
             return self
         return DiagonalJoint(self.terms, self.springs, by_rate=not self.by_rate)
 
     def end(self, i: int, sign: int) -> float:
-        """Return what a parameter runs to: a stiffness is infinite where its compliance may be zero."""
+        """Return the limit of a parameter: a stiffness is infinite if its compliance may be zero."""
         return sign * np.inf if not self.is_stiffness[i] else (np.inf if sign < 0 else 0.0)
 
 
@@ -432,11 +433,11 @@ def _of_triangle(
     pairs : ndarray of int, shape (q, 2)
         Entry of K* that each term changes, with its mirror image.
     slopes : ndarray, shape (q, n_freq)
-        f, by how much.
+        Factor f of each term.
     entries, weight, residual
-        Of all lines.
+        Upper triangle of R, weights and residuals of all lines.
     shared : ndarray of int, shape (q,)
-        The coordinate that each term is.
+        Coordinate of each term.
     """
     p, (n_freq, u) = len(pairs), entries.shape
     normal, descent = np.empty((p, p)), np.empty(p)
@@ -457,17 +458,17 @@ class LawCoordinates(JointCoordinates):
     Parameters
     ----------
     joint : LawJoint
-        Without masses; rigid DOFs have no compliance. Its values are where a fit may start.
+        Joint without masses; rigid DOFs have no compliance. Its values are initial values.
     omega : ndarray, shape (n_freq,)
-        rad/s.
+        Angular frequencies, rad/s.
     size : ndarray, shape (n,)
-        Dynamic stiffness of the structure at the joint DOFs: stiffnesses are sought around it.
+        Dynamic stiffness of the structure at the joint DOFs, N/m: the scale of the stiffnesses sought.
     shared : ndarray of int, shape (q,), optional
-        The parameter that each of `joint` is, of points whose joints are equal; each its own by default.
+        Parameter of each value of `joint`, for points with equal joints; by default all are separate.
 
     Notes
     -----
-    Entries are the upper triangle of C. Stiffnesses and times that cannot be negative are sought as logarithms.
+    Entries are the upper triangle of C. The coordinate of a positive stiffness or time is its logarithm.
     """
 
     def __init__(
@@ -492,7 +493,7 @@ class LawCoordinates(JointCoordinates):
         return self.joint.with_values(self.vector.to_values(x)[self.shared])
 
     def common(self, values: FloatArray) -> FloatArray:
-        """Return values of the parameters from those of all points: their means over equal ones."""
+        """Return values of the parameters from values of all points: means over equal points."""
         return np.asarray(np.bincount(self.shared, values) / np.bincount(self.shared))
 
     def compliance(self, x: FloatArray) -> ComplexArray:
@@ -537,7 +538,7 @@ class LawCoordinates(JointCoordinates):
         return np.diag(self.vector.slope(x))
 
     def has_profile(self, i: int, x: FloatArray, covariance: FloatArray) -> bool:
-        """Whether its interval needs a profile: that of any parameter of a law."""
+        """Return whether its interval needs a profile, as the interval of every parameter of a law does."""
         return True
 
     def value(self, i: int, x: FloatArray) -> float:
@@ -545,9 +546,9 @@ class LawCoordinates(JointCoordinates):
         return self.vector.value(i, x)
 
     def end(self, i: int, sign: int) -> float:
-        """Return what a parameter runs to where its coordinate has no limit below (-1) or above (1)."""
+        """Return the limit of a parameter whose coordinate is unbounded below (-1) or above (1)."""
         return self.vector.end(i, sign)
 
     def longest_reach(self, i: int) -> float:
-        """Return how far from a minimum the limit of a parameter is sought first at most."""
+        """Return the largest distance from a minimum for the first search of a limit."""
         return self.vector.longest_reach(i)

@@ -1,4 +1,4 @@
-"""Joint parameters from interface FRFs: every group of DOFs fitted on its own, and put together."""
+"""Joint parameters from interface FRFs: every group of DOFs fitted separately, and combined."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from jointfrf.laws.law_joint import LawJoint
 
 __all__ = ["GroupData", "GroupStart", "JointEstimate", "assembled", "estimate_joint", "estimate_laws"]
 
-#: A compliance is not taken below this share of its standard error, nor of the receptances around it.
+#: Least compliance, relative to its standard error and to the receptances around it.
 _RIGID, _ROUNDING = 1e-3, 1e-12
 #: Probability at which a fit that leaves cross terms unknown has smaller mean squares by chance; lines may correlate.
 _BY_CHANCE = 1e-6
@@ -44,18 +44,20 @@ GroupData = tuple[NDArray[np.intp], LineData]
 
 
 class GroupStart(NamedTuple):
-    """Where the fit of a group of DOFs begins: at what another fit has found.
+    """Initial values of the fit of a group, from the result of another fit.
 
     Attributes
     ----------
     dofs : ndarray of int
+        DOFs of the group.
     parameters : tuple of parameters, length p
+        Parameters of the group.
     x : ndarray, shape (p,)
         Coordinates of the joint.
     on : OnManifold, optional
         FRFs that nearly fit it.
     springs : ndarray, shape (n,), optional
-        Reference springs to which x and Q belong.
+        Reference springs of x and Q.
     """
 
     dofs: NDArray[np.intp]
@@ -77,20 +79,21 @@ class JointEstimate(NamedTuple):
     Attributes
     ----------
     parameters : sequence of Parameter, or of parameters of laws, length p
-        Those that the FRFs depend on: no cross terms between DOFs of different groups.
+        Parameters on which the FRFs depend: no cross terms between DOFs of different groups.
     theta : ndarray, shape (p,)
-        Their values.
+        Values of the parameters.
     covariance : ndarray, shape (p, p)
-        From the noise of the FRFs, as if lines were independent.
+        Covariance by the noise of the FRFs, as if lines were independent.
     groups : tuple of GroupFit
+        Fits of the groups.
     excess : float
         Mean square of the residual in units of the noise.
     scale : float
-        The same in the units in which lines were weighted: those of the noise, unless lines were seen to vary.
+        Mean square of the residual by the weights of the lines, which differ from the noise if lines vary.
     equations : float
-        Complex equations used.
+        Number of complex equations used.
     kinds : tuple of tuple of FormMinimum
-        Of each group, its minima with fewer damping terms that the data do not exclude: values are means over these.
+        Minima of each group with fewer damping terms that the data do not exclude: values are means over these.
     """
 
     parameters: Sequence[NamedParameter]
@@ -104,7 +107,7 @@ class JointEstimate(NamedTuple):
 
     @property
     def converged(self) -> bool:
-        """Whether the fits of all groups did."""
+        """Whether the fits of all groups converged."""
         return all(group.converged for group in self.groups)
 
     @property
@@ -114,7 +117,7 @@ class JointEstimate(NamedTuple):
 
     @property
     def starts(self) -> tuple[GroupStart, ...]:
-        """Where fits of other FRFs of the same structure begin; not of those unconverged."""
+        """Initial values for fits of other FRFs of the same structure, from groups that converged."""
         return tuple(GroupStart.of(group, group) for group in self.groups if group.converged)
 
 
@@ -129,25 +132,26 @@ def estimate_joint(
     is_explained: bool = False,
     sides_bend: bool = False,
 ) -> JointEstimate:
-    """Fit a joint of springs to FRFs whose noise is known.
+    """Fit a joint of springs to FRFs with known noise.
 
     Parameters
     ----------
     frfs : InterfaceFrfs
+        FRFs with their noise.
     terms : JointTerms
-        Terms of K* that are sought.
+        Terms of K* to fit.
     cross : {"zero", "ignore", "points", "fit"}
-        Whether cross terms of C that are not sought are zero, or unknown.
+        Whether cross terms of C that are not fitted are zero, or unknown.
     used : ndarray of bool, shape (n_freq, n), optional
         Lines used for each DOF; all by default.
     near : sequence of GroupStart
-        Of other FRFs of the same structure, or of other terms: where the fits start first.
+        First initial values, from other FRFs of the same structure, or from other terms.
     data : iterable of (dofs, LineData), optional
-        Groups of DOFs and their FRFs, where they are known.
+        Groups of DOFs and their FRFs, if known.
     is_explained : bool
         Whether a joint with more terms explains the FRFs: then `near` alone suffices to show that this one does not.
     sides_bend : bool
-        Whether the sides may bend between channels and joint.
+        Whether the sides may be flexible between channels and joint.
     """
     groups = []
     known = {(tuple(start.dofs.tolist()), start.parameters): start for start in near}
@@ -176,19 +180,20 @@ def estimate_laws(
     used: NDArray[np.bool_] | None = None,
     same: Sequence[Sequence[str]] = (),
 ) -> JointEstimate:
-    """Fit a joint of laws to FRFs whose noise is known.
+    """Fit a joint of laws to FRFs with known noise.
 
     Parameters
     ----------
     frfs : InterfaceFrfs
+        FRFs with their noise.
     joint : LawJoint
-        Its DOFs in the order of the FRFs, without masses; its values are tried as a start.
+        Joint with its DOFs in the order of the FRFs, without masses; its values are tried as initial values.
     omega : ndarray, shape (n_freq,)
-        rad/s.
+        Angular frequencies, rad/s.
     used : ndarray of bool, shape (n_freq, n), optional
         Lines used for each DOF; all by default.
     same : sequence of sequence of str
-        Points whose joints are equal.
+        Points with equal joints.
     """
     groups, shared = [], parameters_shared(joint.names, same)
     quantities = tuple(joint.quantities[i] for i in np.unique(shared, return_index=True)[1])
@@ -220,14 +225,14 @@ def estimate_laws(
         groups.append(_fitted(_Search(problem, None, "zero", given=starts)))
     if left:
         a, b = next(iter(left))
-        raise ValueError(f"the FRFs between {a} and {b} are zero: they say nothing of the cross term {a},{b}")
+        raise ValueError(f"the FRFs between {a} and {b} are zero and do not determine {a},{b}; remove this term")
     return assembled(quantities, groups)
 
 
 def _near_springs(joint: LawJoint, lines: LineData, omega: FloatArray) -> list[FloatArray]:
-    """Return values of laws near to springs and dampers with the same cross terms, where there are any.
+    """Return values of laws near to springs and dampers with the same cross terms, if any.
 
-    K* of single lines is an inverse of their noisy C, which the cross terms make worse; springs are fitted to C itself.
+    K* of single lines is an inverse of their noisy C, and cross terms increase its noise; springs are fitted to C.
     """
     place = {dof: i for i, dof in enumerate(joint.dofs)}
     pairs = [(place[a], place[b]) for a, b in joint.laws]
@@ -251,7 +256,7 @@ def _grouped(frfs: InterfaceFrfs) -> Iterator[GroupData]:
 
 
 def _count_fitted(fitted: NDArray[np.bool_], which: NDArray[np.intp], names: Sequence[str]) -> None:
-    """Note the parameters of a group as fitted; raise an error for one that is also of another group."""
+    """Mark the parameters of a group as fitted; raise an error if another group has one of them."""
     if twice := [names[i] for i in which if fitted[i]]:
         raise ValueError(
             f"same: the FRFs between equal points are zero, so that {', '.join(twice)} would belong to separate "
@@ -274,13 +279,15 @@ class _Search:
     Attributes
     ----------
     problem : GroupProblem
+        Fit of the group.
     terms : JointTerms or None
-        Terms of springs; None for laws, whose starts are given.
+        Terms of springs; None for laws, whose initial values are given.
     cross : {"zero", "ignore", "points", "fit"}
+        Treatment of cross terms.
     near : GroupStart, optional
         Result of a fit to other FRFs of the same structure, or with other terms.
     is_explained : bool
-        As in `estimate_joint`.
+        Whether a joint with more terms explains the FRFs.
     given : tuple of ndarray, shape (p,)
         Initial values of laws.
     """
@@ -293,11 +300,11 @@ class _Search:
     given: tuple[FloatArray, ...] = ()
 
     def ladder(self) -> Iterator[Sequence[FloatArray]]:
-        """Yield initial values, rung by rung, the likeliest first; a later rung costs fits of its own.
+        """Yield sets of initial values, the most probable first; a later set costs additional fits.
 
-        1. The compliance of single lines, or the values given. It is far off wherever noise hides gamma_jk, and in its
-           weakest direction the more the more entries it has.
-        2. For cross terms that are sought: the joint without them, which is stable there, and near enough.
+        1. The compliance of single lines, or the given values. It is poor if noise exceeds gamma_jk, and poorer in its
+           weakest direction the more entries it has.
+        2. For fitted cross terms: the joint without them, which is stable, and near enough.
         3. For cross terms of zero: the diagonal of C, whatever its cross terms are.
         """
         joint = self.problem.joint
@@ -316,7 +323,7 @@ class _Search:
         return fit_unknown_cross(plain, _starts_of_lines(data, self.terms))
 
     def needs_cross_terms(self, found: GroupFit) -> bool:
-        """Whether no joint without cross terms is near the data, or the diagonal of C alone fits better (F-test)."""
+        """Return whether no joint without cross terms fits, or the diagonal of C alone fits better (F-test)."""
         is_simple = found.joint.in_compliance and found.joint.n > 1
         if not is_simple or found.is_good or self.problem.sides_bend:
             return False
@@ -328,7 +335,7 @@ class _Search:
 
 
 def _fitted(search: _Search) -> GroupFit:
-    """Fit a group: near another fit if that explains the FRFs, else up the ladder of initial values."""
+    """Fit a group: near another fit if that explains the FRFs, else from all sets of initial values."""
     if search.cross == "ignore" and search.problem.joint.in_compliance:
         return search.diagonal
     if search.near is not None:
@@ -345,9 +352,9 @@ def _fitted(search: _Search) -> GroupFit:
 
 
 def _lowest(search: _Search) -> GroupFit:
-    """Go up the ladder until the residual is noise, and return the lowest fit.
+    """Try the sets of initial values until the residual is noise, and return the fit of least squares.
 
-    A fit that comes near the data without converging may have left lines out on its way: it starts again from its end.
+    A fit that comes near the data without converging may have omitted lines on its way: it starts again from its end.
     """
     best: GroupFit | None = None
 
@@ -369,13 +376,13 @@ def _lowest(search: _Search) -> GroupFit:
 
 
 def _starts_of_lines(data: LineData, terms: JointTerms) -> list[FloatArray]:
-    """Return coordinates of the joint from the compliance of some lines, evenly spread, which start as well as all."""
+    """Return coordinates of the joint from the compliance of some evenly spaced lines, which suffice."""
     some = spread_lines(len(data.measured))
     return first_joints(data.on_lines(some), coordinates_of(terms.on_lines(some), data.springs))
 
 
 def _simpler_joints(problem: GroupProblem, joint: CoupledJoint) -> Iterator[FloatArray]:
-    """Yield initial values from the fit without cross terms, and from where that fit started."""
+    """Yield initial values from the fit without cross terms, and the initial values of that fit."""
     terms, common = joint.terms.without_cross_terms()
     simple = DiagonalJoint(terms, problem.data.springs)
     some = spread_lines(len(problem.data.measured))
@@ -383,7 +390,7 @@ def _simpler_joints(problem: GroupProblem, joint: CoupledJoint) -> Iterator[Floa
     ends = starts[:1]
     with suppress(np.linalg.LinAlgError):
         ends.insert(0, fit_dofs(problem._replace(joint=simple), starts).x)
-    # Equal points start from their mean; cross terms, which no term here is, from 0.
+    # Equal points start from their mean; cross terms, for which there is no term here, from 0.
     p = joint.lower.size
     points = np.maximum(np.bincount(common, minlength=p), 1)
     for theta in map(simple.theta, ends):
@@ -392,7 +399,7 @@ def _simpler_joints(problem: GroupProblem, joint: CoupledJoint) -> Iterator[Floa
 
 
 def assembled(parameters: Sequence[NamedParameter], groups: Sequence[GroupFit]) -> JointEstimate:
-    """Put the fits of all groups together."""
+    """Combine the fits of all groups."""
     p = len(parameters)
     theta, covariance = np.full(p, np.nan), np.zeros((p, p))
     for group in groups:
@@ -403,7 +410,7 @@ def assembled(parameters: Sequence[NamedParameter], groups: Sequence[GroupFit]) 
     kept = np.sort(np.concatenate([group.which for group in groups]))
     place = np.full(p, -1)
     place[kept] = np.arange(kept.size)
-    # A group with other numbers is another object, of which everything would be computed again.
+    # A group with other numbers is another object, for which everything would be computed again.
     if kept.size < p:
         groups = [replace(group, problem=group.problem._replace(which=place[group.which])) for group in groups]
     equations = sum(group.equations for group in groups)
@@ -421,11 +428,10 @@ def assembled(parameters: Sequence[NamedParameter], groups: Sequence[GroupFit]) 
 
 
 def _reported(group: GroupFit) -> tuple[FloatArray, FloatArray]:
-    """Return coordinates that give finite parameters, and the covariance with that of rates of rigid DOFs.
+    """Return coordinates with finite parameters, and a covariance that includes rates of rigid DOFs.
 
-    A stiffness beyond what the data can resolve stays a number; its interval says that it is open. Rates that nothing
-    shows because their DOF was found rigid have no variance to speak of, or none that ends: they get that which they
-    would have if the compliance were as large as its standard error.
+    A stiffness beyond the resolution of the data stays a number; its interval is unbounded. Rates of a rigid DOF have
+    no finite variance. They get the variance for a compliance as large as its standard error.
     """
     joint, x, covariance = group.joint, group.x.copy(), group.covariance
     a = joint.is_compliance

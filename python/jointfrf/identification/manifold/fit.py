@@ -56,16 +56,16 @@ __all__ = [
     "uncertainty_of",
 ]
 
-#: An assumed noise level is replaced by that of the residual until both agree to this factor.
+#: An assumed noise level is replaced by the level of the residual until both agree to this factor.
 _AGREE = 1.3
 _MOST_LEVELS = 6
-#: The residual of exact FRFs is rounding: models are not compared below this share of the noise.
+#: Least residual, as a share of the noise, at which models are compared: below it is rounding.
 _LEAST_EXCESS = 1e-12
-#: Share of lines left out from which on parts of the band are compared.
+#: Share of omitted lines above which parts of the band are compared.
 _LEFT_OUT = 0.02
-#: Of fewer lines parts are not compared, and a fit may have several minima: each searches its own starts.
+#: Number of lines below which parts are not compared, and each fit searches all initial values for several minima.
 _FEW = 40
-#: Residual of FRFs without noise, in units of the level assumed.
+#: Residual of FRFs without noise, in units of the assumed level.
 _NO_NOISE = 1e-3
 
 
@@ -73,13 +73,13 @@ _NO_NOISE = 1e-3
 _KINDS: tuple[DampingTerms, ...] = ("none", "viscous", "hysteretic", "both")
 
 
-#: A second damping term must lower BIC by this, odds of 20 to 1, to be taken as certain; and of two kinds with one term
-#: the worse is excluded by this.
+#: Decrease of BIC above which a second damping term is certain, odds of 20 to 1; of two kinds with one term, the worse
+#: is excluded beyond it.
 MARGIN = 6.0
-#: Two terms are not excluded by one whose BIC is lower by less than this.
+#: Difference of BIC below which two terms are not excluded by one.
 _HARDLY = 2.0
-#: Terms whose BIC exceeds that of all others by this, ten times what is clear, on about so many lines alone, need no
-#: fit of their own: the quadratic forms, minimised until steps gain less than this, are not that wrong.
+#: Excess of BIC, ten times a clear one, on about this many lines alone, above which terms need no separate fit: the
+#: error of the quadratic forms, minimised until steps gain less than this, is smaller.
 _EXCLUDED, _SOME_LINES, _COARSE = 100.0, 150, 0.1
 
 
@@ -89,10 +89,12 @@ class DofDamping(NamedTuple):
     Attributes
     ----------
     dof : str
+        Name of the DOF.
     best, second : str
+        Best and second-best terms.
     margin : float
-        BIC of the second less that of the best: above 10 the choice is clear, below 2 the data hardly prefer one;
-        negative where the second has one more term that the data do not support clearly.
+        BIC of the second minus BIC of the best: above 10 the choice is clear, below 2 the data hardly prefer one. It is
+        negative if the second has one more term that the data do not support clearly.
     others : tuple of (str, float)
         Kinds of damping that the data do not exclude, and their probability: values are means over these and the best.
     """
@@ -105,7 +107,7 @@ class DofDamping(NamedTuple):
 
     @property
     def terms(self) -> DampingTerms:
-        """Terms that are fitted: those of all kinds that are not excluded."""
+        """Terms that are fitted, which are the terms of all kinds that are not excluded."""
         return "both" if self.others else self.best
 
     @classmethod
@@ -130,21 +132,23 @@ class ManifoldFit(NamedTuple):
     Attributes
     ----------
     problem : FitProblem
-        With the noise level that was used.
+        Problem with the noise level that was used.
     estimate : JointEstimate
+        Values of the parameters.
     known : JointUncertainty
-        How well the parameters are known.
+        Uncertainty of the parameters.
     parts : BandParts or None
-        Fits of parts of the band, where lines that do not fit the joint were left out.
+        Fits of parts of the band, if lines that do not fit the joint were omitted.
     intervals : Intervals
+        Intervals of the parameters.
     test : ResidualTest
-        The residual against the noise.
+        Test of the residual against the noise.
     alone : JointAlone or None
-        Compliance of the joint alone, where the channels show how much the sides bend.
+        Compliance of the joint alone, if the channels show the flexibility of the sides.
     cross_fits : bool
         Whether cross terms would remove a misfit.
     choices : tuple of DofDamping
-        Empty where the damping terms were given.
+        Choice of damping of each DOF; empty if the damping terms were given.
     """
 
     problem: FitProblem
@@ -164,12 +168,12 @@ class ManifoldFit(NamedTuple):
 
     @property
     def noise_level(self) -> float:
-        """Noise relative to the FRFs: that of the residual where no other is known."""
+        """Noise relative to the FRFs, or the level of the residual if no other is known."""
         return self.residual_level if self.problem.noise.is_assumed else self.problem.noise.level
 
 
 def fit_springs(problem: FitProblem) -> ManifoldFit:
-    """Fit a joint of springs and dampers, find its uncertainty, and compare its residual with the noise."""
+    """Fit a joint of springs and dampers, compute its uncertainty, and compare its residual with the noise."""
     problem, found, choices = estimated_joint(problem)
     known, parts = uncertainty_of(problem, found, choices)
     test = residual_test_of(found, problem.freq_hz, problem.noise.inflation, known)
@@ -180,7 +184,7 @@ def fit_springs(problem: FitProblem) -> ManifoldFit:
 
 
 def _alone(problem: FitProblem, found: JointEstimate, known: JointUncertainty, bending: SideBending) -> JointAlone:
-    """Return the compliance of the joint alone, from C of each line without what was added to the noise of channels."""
+    """Return the compliance of the joint alone, from C of each line without the variance added for the channels."""
     n, freq = len(problem.dofs), problem.freq_hz
     frfs = problem.frfs if problem.deformation is None else problem.frfs.without(problem.deformation)
     value, spread = np.full((freq.size, n), np.nan, complex), np.full((freq.size, n), np.nan)
@@ -198,7 +202,7 @@ def _alone(problem: FitProblem, found: JointEstimate, known: JointUncertainty, b
 
 
 def _fitted_compliance(group: GroupFit, factors: Sequence[FloatArray]) -> FloatArray:
-    """Return C_dd at w = 0 of the joint fitted, and its standard errors by variance factors below, shape (., n)."""
+    """Return C_dd at w = 0 of the fitted joint, and its standard errors by the given variance factors, shape (., n)."""
     joint, n = group.joint, len(group.dofs)
     if joint.in_compliance:
         stiff = joint.is_compliance
@@ -222,13 +226,14 @@ def _fitted_compliance(group: GroupFit, factors: Sequence[FloatArray]) -> FloatA
 
 
 def fit_laws(problem: FitProblem, joint: LawJoint) -> ManifoldFit:
-    """Fit the parameters of all laws of a joint, as `fit_springs` those of springs.
+    """Fit the parameters of all laws of a joint, and return the result with its uncertainty.
 
     Parameters
     ----------
     problem : FitProblem
+        FRFs and options.
     joint : LawJoint
-        Its DOFs in the order of the problem, without masses.
+        Joint with its DOFs in the order of the problem, without masses.
     """
 
     def fit(own: FitProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
@@ -246,10 +251,11 @@ def estimated_joint(problem: FitProblem) -> tuple[FitProblem, JointEstimate, tup
     Returns
     -------
     problem : FitProblem
-        With the noise level that was used.
+        Problem with the noise level that was used.
     estimate : JointEstimate
+        Values of the parameters.
     choices : tuple of DofDamping
-        Empty where the damping terms were given.
+        Choice of damping of each DOF; empty if the damping terms were given.
     """
     return _estimated(problem, _with_damping)
 
@@ -257,7 +263,7 @@ def estimated_joint(problem: FitProblem) -> tuple[FitProblem, JointEstimate, tup
 def uncertainty_of(
     problem: FitProblem, found: JointEstimate, choices: tuple[DofDamping, ...] = ()
 ) -> tuple[JointUncertainty, BandParts | None]:
-    """Return how well the parameters of a joint of springs are known, and what parts of the band show."""
+    """Return the uncertainty of the parameters of a joint of springs, and the comparison of parts of the band."""
     known = _uncertainty(problem, found, problem.added_compliance)
     parts = _band_parts(problem, found, known, choices)
     if parts is None:
@@ -282,7 +288,7 @@ def _uncertainty(problem: FitProblem, found: JointEstimate, compliance: FloatArr
 def _estimated(
     problem: FitProblem, fit: Callable[[FitProblem], tuple[JointEstimate, tuple[DofDamping, ...]]]
 ) -> tuple[FitProblem, JointEstimate, tuple[DofDamping, ...]]:
-    """Fit; where the noise level is assumed, again with that of the residual until both agree."""
+    """Fit; repeat with the level of the residual until both agree if the noise level is assumed."""
     freq = problem.freq_hz
     span = f"one line, {freq[0]:g} Hz" if freq.size == 1 else f"{freq.size} lines, {freq.min():g} to {freq.max():g} Hz"
     try:
@@ -300,9 +306,9 @@ def _estimated(
 
 
 def _inflation(problem: FitProblem, found: JointEstimate) -> float:
-    """Return how many neighbouring lines carry the noise of one, at most as many as the residual of the fit shows.
+    """Return the number of neighbouring lines with the noise of one, at most as many as the residual of the fit shows.
 
-    A rational function that misses the FRFs leaves a residual that goes smoothly over frequency. If the correlation was
+    A rational function that misses the FRFs leaves a residual that is smooth over frequency. If the correlation was
     estimated from it, and not from differences of reciprocal FRFs, the residual at the joint limits it.
     """
     noise = problem.noise
@@ -321,7 +327,7 @@ def _inflation(problem: FitProblem, found: JointEstimate) -> float:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Issue no warnings: lines on which noise hides the joint are ill-conditioned, and a start may lead to infinity."""
+    """Suppress warnings: noisy lines are ill-conditioned, and initial values may lead to infinity."""
     with warnings.catch_warnings(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         warnings.simplefilter("ignore", IllConditionedWarning)
         yield
@@ -330,7 +336,7 @@ def _quiet() -> Iterator[None]:
 def _band_parts(
     problem: FitProblem, result: JointEstimate, known: JointUncertainty, choices: tuple[DofDamping, ...]
 ) -> BandParts | None:
-    """Fit parts of the band where lines were left out of the fit of all of it."""
+    """Fit parts of the band if lines were omitted from the fit of the whole band."""
     if problem.sides_bend or left_out_share(result) < _LEFT_OUT or problem.freq_hz.size < _FEW:
         return None
 
@@ -354,7 +360,7 @@ def _cross_fits(
     test: ResidualTest,
     choices: tuple[DofDamping, ...],
 ) -> bool:
-    """Whether a fit with cross terms leaves a residual that is noise, where that without does not."""
+    """Return whether a fit with cross terms has a residual of noise, and the fit without does not."""
     coupled = any(len(group.dofs) > 1 for group in result.groups)
     is_asked = problem.options.cross == "zero" and not (problem.noise.is_assumed or problem.sides_bend)
     if not (is_asked and test.is_large and coupled):
@@ -383,7 +389,7 @@ def _with_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping,
     if problem.freq_hz.size >= _FEW and left_out_share(both) == 0:
         problem = replace(problem, near=_starts(problem, both, chosen))
     data = both.data
-    # Its quadratic forms, of which a long sweep has many, are not needed any more.
+    # Its quadratic forms, many for a long sweep, are no longer needed.
     del both, group
     return _averaged(_estimate(problem, chosen, data=data), problem.dofs, choices), choices
 
@@ -391,8 +397,8 @@ def _with_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping,
 def _averaged(found: JointEstimate, dofs: tuple[str, ...], choices: tuple[DofDamping, ...]) -> JointEstimate:
     """Return the means over kinds of damping that the data do not exclude, of an estimate with the terms of all.
 
-    The joint distribution of the parameters is the mixture of those of the kinds, each normal, weighted by its odds
-    (Bayesian model averaging); a kind has zero for terms that it lacks. DOFs are taken one by one.
+    The joint distribution of the parameters is the mixture of the normal distributions of the kinds, weighted by odds
+    (Bayesian model averaging); a kind has zero for terms that it lacks. DOFs are averaged one by one.
     """
     if not any(one.others for one in choices):
         return found
@@ -419,14 +425,14 @@ def _averaged(found: JointEstimate, dofs: tuple[str, ...], choices: tuple[DofDam
             theta[group.which] += mean - base[0]
             own_part = np.ix_(group.which, group.which)
             whole = covariance[own_part] + spread - base[1]
-            # What two lines hardly determine has no derivatives that agree far from the minimum.
+            # If two lines hardly determine a parameter, derivatives far from the minimum do not agree.
             covariance[own_part] = whole if (np.diagonal(whole) > 0).all() else spread
             kinds_of_groups[-1] += minima
     return found._replace(theta=theta, covariance=covariance, kinds=tuple(map(tuple, kinds_of_groups)))
 
 
 def _values_of(group: GroupFit, minimum: FormMinimum) -> tuple[FloatArray, FloatArray]:
-    """Return parameters of a group, zero for those that a minimum lacks, shape (p,), and their covariance."""
+    """Return parameters of a group, zero if a minimum lacks them, shape (p,), and their covariance."""
     at = [group.joint.names.index(name) for name in minimum.joint.names]
     values, covariance = np.zeros(group.x.size), np.zeros((group.x.size, group.x.size))
     slope = minimum.joint.theta_slope(minimum.x)
@@ -449,7 +455,7 @@ def _with_common_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofD
         return score(sum(group.squares for group in result.groups), len(result.parameters))
 
     scores = {kind: score_of(result) for kind, result in results.items()}
-    # Where both terms together fit, one of them needs no other start to show that it does not, and mostly no fit.
+    # If both terms together fit, other initial values are not needed to show that one of them does not fit.
     is_explained = all(group.is_noise for group in both.groups)
     bound = score(_least_squares(problem, both, "hysteretic"), len(results["viscous"].parameters))
     if is_explained and bound > max(scores.values()) + _EXCLUDED:
@@ -465,7 +471,7 @@ def _with_common_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofD
 
 
 def _least_squares(problem: FitProblem, found: JointEstimate, damping: DampingTerms) -> float:
-    """Return what the squares with fewer terms are at least: on some lines as they then are, on others as they were."""
+    """Return a lower bound of the squares with fewer terms, from the final weights of some lines and earlier ones."""
     terms, squares = _terms(problem, damping, problem.options.cross), 0.0
     for group in found.groups:
         some = slice(None, None, max(1, len(group.used) // _SOME_LINES))
@@ -478,7 +484,7 @@ def _least_squares(problem: FitProblem, found: JointEstimate, damping: DampingTe
 def _starts(
     problem: FitProblem, found: JointEstimate, damping: DampingTerms | Sequence[DampingTerms]
 ) -> tuple[GroupStart, ...]:
-    """Return where fits with these terms begin: at what others have found; not where these did not converge."""
+    """Return initial values of fits with these terms from other fits that converged."""
     terms = _terms(problem, damping, problem.options.cross)
     return tuple(
         GroupStart.of(group, _minimum(group, terms.of_dofs(group.dofs)[0]))
@@ -515,11 +521,12 @@ def choose_damping(group: GroupFit, dofs: tuple[str, ...], factor: float) -> lis
     Parameters
     ----------
     group : GroupFit
-        A joint without cross terms; its quadratic forms are minimised again with fewer terms of one DOF at a time.
+        Fit of a joint without cross terms; its quadratic forms are minimised again with fewer terms of one DOF at a
+        time.
     dofs : tuple of str
         Names of the DOFs of the group.
     factor : float
-        By how much the variance of parameters exceeds that from independent noise: squares count so much less.
+        Ratio of the variance of parameters to the variance by independent noise, by which squares are divided.
 
     Notes
     -----
@@ -548,7 +555,7 @@ def choose_damping(group: GroupFit, dofs: tuple[str, ...], factor: float) -> lis
 def _minimum(
     group: GroupFit, terms: JointTerms, lines: slice = slice(None), least_gain: float = LEAST_GAIN
 ) -> FormMinimum:
-    """Minimise the forms of a group with other terms, from the joint found; terms that it has not begin at zero."""
+    """Minimise the forms of a group with other terms, from the present joint; additional terms start at zero."""
     terms = terms.on_lines(lines)
     joint = coordinates_of(terms, group.problem.data.reference)
     found = dict(zip(group.joint.names, group.joint.theta(group.x).tolist(), strict=True))

@@ -1,8 +1,9 @@
-"""Sides that bend between channels and joint, from the FRFs alone: what they add to the compliance of the joint.
+"""Flexible sides between channels and joint, from the FRFs alone: their contribution to the compliance of the joint.
 
-Between virtual points a joint of compliance C is seen as C_seen = Q (C + D_A + D_B) P (docs/sides.md): softer at low
-frequency by what the sides give way between channels and joint, D0 = D_A(0) + D_B(0), and changing over frequency by
-their inertia. The FRFs determine C + D0, and how much the sides bend among the channels; D0 only within a factor.
+Between virtual points a joint of compliance C appears as C_seen = Q (C + D_A + D_B) P (docs/sides.md). At low frequency
+it is softer by the flexibility of the sides between channels and joint, D0 = D_A(0) + D_B(0), and it changes over
+frequency by their inertia. The FRFs determine C + D0, and the deformation of the sides among the channels; they
+determine D0 only within a factor.
 """
 
 from __future__ import annotations
@@ -20,38 +21,38 @@ from jointfrf.kernel.linear_algebra import solve
 
 __all__ = ["JointAlone", "SideBending", "joint_alone", "side_bending"]
 
-#: A channel with far less noise than others must not be all that a mean over lines takes.
+#: Least relative noise of a channel, so that a channel with far less noise does not determine a mean over lines alone.
 _LEAST_VARIANCE = 1e-3
-#: One-sided 95 % of a normal distribution: bending that noise does not exclude.
+#: One-sided 95 % of a normal distribution: deformation that noise does not exclude.
 _NOT_EXCLUDED = 1.65
-#: Spare channels that sides of the simulated pairs have at least; with fewer the squares of bending are those of few
-#: degrees of freedom.
+#: Least number of spare channels in the simulated pairs; with fewer, the squares of the deformation have few degrees of
+#: freedom.
 _LEAST_SPARE = 3
 #: Standard deviations of a two-sided interval of 95 %.
 _TWO_SIDED = 1.96
-#: Rounds of the robust regression, and the residual in standard deviations from which on a line weighs less.
+#: Number of rounds of the robust regression, and residual in standard deviations above which a line gets less weight.
 _ROUNDS, _HUBER = 12, 1.5
 #: Median of the square of a standard normal number.
 _MEDIAN_SQUARE = 0.455
-#: The error of the intercept over the change that the term of w^4 makes, with four times the variance of noise beside
-#: it: its 95 % quantile over simulated pairs of bodies (docs/sides.md).
+#: Ratio of the error of the intercept to the change by the term of w^4, including four times the variance of noise: its
+#: 95 % quantile over simulated pairs of bodies (docs/sides.md).
 _INERTIA = 2.0
-#: D0 over what is seen of bending, of translations and of rotations: median, and 97.5 % quantile, over the same pairs;
-#: below zero it may be where impacts are not at the sensors, 2.5 % quantile.
+#: Ratio of D0 to the observed deformation, for translations and for rotations: median and 97.5 % quantile over the same
+#: pairs, and the 2.5 % quantile, which may be negative if impacts are not at the sensors.
 _MIDDLE, _LARGE, _NEGATIVE = (1.1, 3.6), (6.0, 16.0), (0.2, 0.0)
-#: Part of the compliance among the channels in what is seen of bending: it makes these quantiles lie closest.
+#: Weight of the compliance among the channels in the observed deformation, which makes these quantiles narrowest.
 _AMONG = 0.5
 
 
 class SideBending(NamedTuple):
-    """How much both sides bend among their channels, per joint DOF, m/N or rad/(N m), shape (n,) each.
+    """Deformation of both sides among their channels, per joint DOF, m/N or rad/(N m), shape (n,) each.
 
     Attributes
     ----------
     low : ndarray
-        With the noise taken off; may be 0.
+        Estimate with the noise subtracted; may be 0.
     high : ndarray
-        What noise does not exclude.
+        Upper bound that noise does not exclude.
     """
 
     low: FloatArray
@@ -61,25 +62,31 @@ class SideBending(NamedTuple):
 def side_bending(
     measured: ComplexArray, smooth: ComplexArray, variance: FloatArray, responses: ChannelModes, forces: ChannelModes
 ) -> SideBending | None:
-    """Return how much the sides bend among their channels; None where the channels of a side have none to spare.
+    """Return the deformation of the sides among their channels; None if a side has no spare channels.
 
     Parameters
     ----------
     measured, smooth : ndarray, shape (n_freq, m_r, m_f)
-        FRFs of the channels, m/N.
+        Measured and smooth FRFs of the channels, m/N.
     variance : ndarray, shape (n_freq, m_r, m_f)
-        E|e|^2 of the measured ones, inf where one is not used.
+        Noise variance E|e|^2 of the measured FRFs, inf if one is not used.
     responses, forces : ChannelModes
+        Rigid motion of the channels.
 
     Notes
     -----
-    V = h_AB T_f^T gamma_jk^-1 gamma_jj - h_AA T_f^T is the motion of the channels of A under load at the joint against
-    load on the channels, with the virtual point at rest, whatever the joint is; at the joint itself the same field is
-    D_A P. Its mean over the lines, by the noise of each entry and without rigid motion, gives for a DOF with weights
-    t_d of m channels |t_d| sqrt(m/3) (sum V_id^2 / (m - n))^(1/2); the geometric mean of that from responses and from
-    forces, summed over both sides. Channels on a ring around the joint may not see it bend: half of the compliance
-    among the channels, |t_d,r| |t_d,f| delta, delta the mean singular value of (1 - R T) h (1 - R T)^T, is added in
-    squares, which makes the quantiles of D0 over both together half as wide as over V alone.
+    V = h_AB T_f^T gamma_jk^-1 gamma_jj - h_AA T_f^T compares the motion of the channels of A under load at the joint
+    and under load on the channels, with the virtual point at rest. It is the same for any joint. At the joint the same
+    field is D_A P. The mean of V over the lines is weighted by the noise of each entry, without rigid motion. For a DOF
+    with weights t_d of m channels it gives |t_d| sqrt(m/3) (sum V_id^2 / (m - n))^(1/2). The result is the geometric
+    mean of this number for responses and for forces, summed over both sides.
+
+    Channels on a ring around the joint may not show deformation. Half of the compliance among the channels is therefore
+    added in squares, |t_d,r| |t_d,f| delta::
+
+        delta = mean singular value of (1 - R T) h (1 - R T)^T
+
+    Quantiles of D0 over both together are half as wide as quantiles over V alone.
     """
     channels = _Channels(measured, variance, responses.transform @ smooth @ forces.transform.T, responses, forces)
     found = []
@@ -96,7 +103,7 @@ def side_bending(
 
 
 class _Channels(NamedTuple):
-    """FRFs of channels, E|e|^2 of their noise, smooth FRFs between the joint DOFs, and what the channels are."""
+    """FRFs of channels, E|e|^2 of their noise, smooth FRFs between the joint DOFs, and rigid motion of the channels."""
 
     measured: ComplexArray
     variance: FloatArray
@@ -106,7 +113,7 @@ class _Channels(NamedTuple):
 
     @property
     def turned(self) -> _Channels:
-        """Forces for responses."""
+        """Return the same with forces and responses exchanged."""
         return _Channels(
             self.measured.swapaxes(1, 2), self.variance.swapaxes(1, 2), self.gamma.swapaxes(1, 2),
             self.forces, self.responses,
@@ -114,7 +121,7 @@ class _Channels(NamedTuple):
 
 
 def _of_side(channels: _Channels, side: int) -> SideBending | None:
-    """Return what the responses of one side show."""
+    """Return the deformation from the responses of one side."""
     measured, variance, gamma, responses, forces = channels
     n = gamma.shape[1] // 2
     here, there = slice(side * n, (side + 1) * n), slice((1 - side) * n, (2 - side) * n)
@@ -123,7 +130,7 @@ def _of_side(channels: _Channels, side: int) -> SideBending | None:
     if spare < 1:
         return None
     t_own, t_across = forces.transform[here][:, columns], forces.transform[there][:, across]
-    # A moment or force of the other virtual point that moves this one as its own does.
+    # A moment or force of the other virtual point that moves this one like a load on this one.
     ratio = solve(np.ascontiguousarray(gamma[:, here, there]), np.ascontiguousarray(gamma[:, here, here]))
     through = t_across.T @ ratio
     field = measured[:, rows[:, None], across] @ through - measured[:, rows[:, None], columns] @ t_own.T
@@ -146,13 +153,13 @@ def _of_side(channels: _Channels, side: int) -> SideBending | None:
 
 
 def _of_few(spare: int) -> float:
-    """Return by how much more a few spare channels may have missed, by Student's t."""
+    """Return the factor of an upper limit from a few spare channels, by Student's t."""
     few, least = (float(special.stdtrit(min(count, _LEAST_SPARE), 0.975)) for count in (spare, _LEAST_SPARE))
     return few / least
 
 
 def _among_channels(channels: _Channels, side: int) -> SideBending | None:
-    """Return the compliance that the channels of a side have among them, for forces and motion of each joint DOF."""
+    """Return the compliance among the channels of a side, for forces and motion of each joint DOF."""
     measured, variance, _, responses, forces = channels
     n = len(responses.transform) // 2
     rows, columns, here = responses.of_side(side), forces.of_side(side), slice(side * n, (side + 1) * n)
@@ -169,14 +176,14 @@ def _among_channels(channels: _Channels, side: int) -> SideBending | None:
 
 
 class _StaticCompliance(NamedTuple):
-    """Compliance seen at zero frequency, C + D0, m/N or rad/(N m), shape (n,) each.
+    """Compliance between virtual points at zero frequency, C + D0, m/N or rad/(N m), shape (n,) each.
 
     Attributes
     ----------
     value : ndarray
         Intercept over w^2 and w^4.
     std_error : ndarray
-        From noise, and from what scatters beside the trend.
+        Standard error from noise, and from scatter about the trend.
     before : ndarray
         Intercept over w^2 alone.
     """
@@ -192,11 +199,11 @@ def _static_compliance(omega: FloatArray, compliance: ComplexArray, variance: Fl
     Parameters
     ----------
     omega : ndarray, shape (n_freq,)
-        rad/s.
+        Angular frequencies, rad/s.
     compliance : ndarray, shape (n_freq, n)
-        Diagonal of C of each line, m/N; NaN where a line does not give it.
+        Diagonal of C of each line, m/N; NaN if a line does not determine it.
     variance : ndarray, shape (n_freq, n)
-        E|e|^2 of its noise.
+        Noise variance E|e|^2 of the compliance.
     """
     x = (omega / omega.max()) ** 2
     found = [[_intercept(x, c, v, order) for c, v in zip(compliance.T, variance.T, strict=True)] for order in (1, 2)]
@@ -205,7 +212,7 @@ def _static_compliance(omega: FloatArray, compliance: ComplexArray, variance: Fl
 
 
 def _intercept(x: FloatArray, compliance: ComplexArray, variance: FloatArray, order: int) -> tuple[float, float]:
-    """Return the intercept of a polynomial, robust: near resonances of the sides lines leave any trend."""
+    """Return the intercept of a polynomial by robust regression, because resonances of the sides disturb the trend."""
     known = np.isfinite(compliance.real) & np.isfinite(variance) & (variance > 0)
     y, noise = compliance.real[known], variance[known] / 2
     order = min(order, max(int(known.sum()) - 2, 0))
@@ -225,18 +232,18 @@ def _intercept(x: FloatArray, compliance: ComplexArray, variance: FloatArray, or
 
 
 class JointAlone(NamedTuple):
-    """Compliance of a joint without its sides, and as seen between virtual points, m/N or rad/(N m), shape (n,) each.
+    """Compliance of a joint without its sides, and between virtual points, m/N or rad/(N m), shape (n,) each.
 
     Attributes
     ----------
     seen : ndarray
-        C + D0, static.
+        Static compliance C + D0 between virtual points.
     noise, inertia : ndarray
-        Half widths of its 95 % interval: from noise, and from what the inertia of the sides makes over frequency.
+        Half widths of its 95 % interval from noise, and from the change over frequency by the inertia of the sides.
     best : ndarray
-        C of the joint alone.
+        Estimate of C of the joint alone.
     softer, stiffer : ndarray
-        What the sides may add to its 95 % interval above and below `seen`.
+        Contributions of the sides to its 95 % interval above and below `seen`.
     """
 
     seen: FloatArray
@@ -253,7 +260,7 @@ class JointAlone(NamedTuple):
 
     @property
     def limits(self) -> tuple[FloatArray, FloatArray]:
-        """95 % interval of the joint alone; 0 where it may be rigid."""
+        """95 % interval of the joint alone; 0 if it may be rigid."""
         low = self.seen - np.hypot(self.stiffer, self.reach)
         return np.maximum(low, 0.0), self.seen + np.hypot(self.softer, self.reach)
 
@@ -267,26 +274,28 @@ def joint_alone(
     bending: SideBending,
     is_rotation: NDArray[np.bool_],
 ) -> JointAlone:
-    """Return the compliance of the joint alone by what bends among the channels.
+    """Return the compliance of the joint alone, from the deformation among the channels.
 
     Parameters
     ----------
     omega : ndarray, shape (n_freq,)
-        rad/s.
+        Angular frequencies, rad/s.
     compliance, variance : ndarray, shape (n_freq, n)
-        Diagonal of C seen of each line, and E|e|^2 of its noise; NaN where a line does not give it.
+        Diagonal of C of each line between virtual points, and its noise variance; NaN if a line does not determine it.
     fitted : three of ndarray, shape (n,)
-        C_dd as fitted, one number for all lines, its standard error by noise, and by channels a little off.
+        Fitted C_dd, one number for all lines, its standard error by noise, and its standard error by position errors.
     size : ndarray, shape (n,)
         Median size of the receptances of each joint DOF, m/N or rad/(N m).
     bending : SideBending
+        Deformation of the sides among the channels.
     is_rotation : ndarray of bool, shape (n,)
+        Whether each joint DOF is a rotation.
 
     Notes
     -----
-    Quantiles of D0 over bending, and of the error of the intercept, over simulated pairs of bodies. Where the sides
-    cannot bend by more than what moves the estimate within its noise, what was fitted to all lines is taken for C seen:
-    inertia changes C_seen by a share of about D/|gamma|.
+    The limits are quantiles, over simulated pairs of bodies, of D0 over the deformation, and of the error of the
+    intercept. If possible flexibility of the sides changes the estimate by less than its noise, the fit to all lines
+    replaces the intercept: inertia changes C_seen by a share of about D/|gamma|.
     """
     static = _static_compliance(omega, compliance, variance)
     middle, large, negative = (np.where(is_rotation, r, t) for t, r in (_MIDDLE, _LARGE, _NEGATIVE))
@@ -294,10 +303,10 @@ def joint_alone(
     is_rigid = large * bending.high / np.maximum(size, TINY) * abs(value) <= error
     is_rigid |= ~np.isfinite(static.value)
     seen = np.where(is_rigid, value, static.value)
-    # Errors of channels that are smooth over frequency do not show in the scatter of lines.
+    # Errors of channels that are smooth over frequency do not appear in the scatter of lines.
     noise = np.hypot(np.where(is_rigid, _TWO_SIDED * error, 2 * _INERTIA * static.std_error), _TWO_SIDED * smooth)
     inertia = np.where(is_rigid, 0.0, _INERTIA * abs(static.value - static.before))
-    # At most as soft as noise and inertia allow, where these alone leave the sign open.
+    # At most as soft as noise and inertia allow, if these alone leave the sign undetermined.
     size_seen = np.maximum(seen, np.hypot(noise, inertia) / 2)
     best = size_seen / (1 + middle * bending.low / np.maximum(size_seen, TINY))
     return JointAlone(seen, noise, inertia, best, negative * bending.high, large * bending.high)

@@ -1,4 +1,4 @@
-"""The fit of one group of joint DOFs: project smooth FRFs, linearise there, minimise, until nothing moves."""
+"""The fit of one group of joint DOFs: project smooth FRFs, linearise there, minimise, until convergence."""
 
 from __future__ import annotations
 
@@ -41,40 +41,40 @@ __all__ = [
     "fit_dofs",
 ]
 
-#: Linearisations at most.
+#: Maximum number of linearisations.
 _MOST = 25
 #: The fit has converged when the coordinates move by less than this many standard errors, root mean square.
 _MOVED = 0.02
-#: Steps of the projection: of the first one, of those that follow a small change of the joint, of lines started again.
+#: Steps of the projection: of the first one, of those after a small change of the joint, of lines started again.
 _FIRST_STEPS, _NEXT_STEPS, _OTHER_STEPS = 30, 8, 25
-#: A line is left out beyond this distance from the manifold, in squares per unknown and of the noise, and beyond the
-#: distance that noise reaches on any line with this probability.
+#: A line is omitted if its distance from the manifold exceeds this multiple of the squares per unknown and of the
+#: noise, and the distance that noise reaches on any line with this probability.
 FAR, _BY_CHANCE = 3.0, 1e-3
-#: FRFs of fewer lines that are not smoothed: the second distance is this factor larger, as the level is uncertain.
+#: Number of lines below which FRFs are not smoothed: the second distance is larger by this factor for them.
 _NOT_SMOOTHED, _LEVEL = 50, 2.0
-#: Linearisations of a fit that stays far from the data, from the first start and from others; after twice the first
-#: number lines that are not used do not come back.
+#: Linearisations of a fit that stays far from the data, from the first and from further initial values; after twice the
+#: first number, omitted lines stay omitted.
 PATIENCE, LITTLE_PATIENCE = 8, 4
-#: A fit is far from the data when the squares exceed their number by this factor.
+#: A fit is far from the data if the squares exceed their number by this factor.
 _LOST = 9.0
-#: Fits whose squares differ by less have ended at the same place.
+#: Difference of squares below which two fits have ended at the same minimum.
 _SAME = 1.0
-#: A residual may be noise up to this mean square, for what is not known of the noise, and so many standard deviations.
+#: Largest mean square of a residual of noise, for errors of the noise level, and the margin in standard deviations.
 _NOISE, _SIGMA = 1.03, 5.0
-#: A compliance is poorly determined when its standard error exceeds this share of it: the FRFs may then hardly show M.
+#: A compliance is poorly determined if its standard error exceeds this share of it: the FRFs may then hardly show M.
 _POORLY = 0.05
-#: Steps that reverse, to this cosine, and shrink by less than this factor go to and fro between two points.
+#: Steps oscillate if their cosine is below this value, and they shrink by less than this factor.
 _REVERSED, _SHRUNK = -0.8, 0.5
-#: Least part of such a step that is taken; a fit for which that is too much ends where it is.
+#: Least length of a damped step; a fit that needs shorter steps ends.
 _LEAST_SHARE = 0.1
-#: Ends no farther apart than this, in standard errors, root mean square: between them a fit has converged. Along a
-#: direction in which -2 log likelihood is that flat, higher powers than squares count, which no step knows.
+#: Largest distance of two ends, in standard errors, root mean square, between which an oscillating fit has converged.
+#: Along so flat a direction of -2 log likelihood, terms above the second order matter, which no step contains.
 _SWINGS = 0.5
-#: Starts of a fit where the sides bend.
+#: Number of initial values of a fit with flexible sides.
 _FEW_STARTS = 2
-#: Targets whose gradients are found together.
+#: Number of targets whose gradients are computed together.
 _AT_ONCE = 8
-#: Entries of changed FRFs held at once where more changes than that are: 64 MB.
+#: Number of entries of changed FRFs in memory at once: 64 MB.
 _MOST_ENTRIES = 2**22
 
 
@@ -88,15 +88,17 @@ class GroupProblem(NamedTuple):
     which : ndarray of int
         Its parameters among all.
     data : LineData
-        Its noise is known: a weighted residual has mean square 1.
+        FRFs with known noise: a weighted residual has mean square 1.
     joint : JointCoordinates
+        Coordinates of the joint.
     unknown : ndarray of bool, shape (n_freq, n * n)
-        Entries of C, row by row, that may have any value on a line: cross terms that are not sought, and DOFs outside
+        Entries of C, row by row, that may have any value on a line: cross terms that are not fitted, and DOFs outside
         their bands.
     hidden : int
-        Entries of M that no FRF shows: those between rigid DOFs.
+        Number of entries of M that no FRF shows: those between rigid DOFs.
     sides_bend : bool
-        Whether the sides may bend between channels and joint: no joint need be near all lines, and none is sought long.
+        Whether the sides may be flexible between channels and joint: no joint need be near all lines, and the search is
+        short.
     """
 
     dofs: NDArray[np.intp]
@@ -108,7 +110,7 @@ class GroupProblem(NamedTuple):
     sides_bend: bool = False
 
     def equations(self) -> FloatArray:
-        """Return the complex equations of each line: entries used, less what is free and what is unknown."""
+        """Return the number of complex equations of each line: entries used minus free and unknown entries."""
         places = _unit_places(self.data)
         unknown = np.count_nonzero(self.unknown[:, places], axis=1)
         used = np.count_nonzero(self.data.used, axis=1)
@@ -126,9 +128,9 @@ class UnknownCrossTerms(NamedTuple):
     is_symmetric : bool
         Whether C is symmetric to noise; otherwise its symmetry was not used.
     scatter : ndarray, shape (n,), optional
-        Standard deviation of the diagonal of C between lines in excess of its noise, m/N; where there is such excess.
+        Standard deviation of the diagonal of C between lines in excess of its noise, m/N; None without such excess.
     hidden : int
-        Lines that count less than half because noise hides gamma_jk.
+        Number of lines that count less than half because noise exceeds gamma_jk.
     """
 
     noise_squares: float
@@ -144,18 +146,21 @@ class GroupFit(FormMinimum):
     Attributes
     ----------
     problem : GroupProblem
+        FRFs and options.
     used : ndarray of bool, shape (n_freq,)
-        Lines on which the FRFs can fit a joint near the one found; others weigh nothing in the forms.
+        Lines on which the FRFs fit a joint near the estimate; all further lines have no weight in the forms.
     equations : float
-        Complex equations used.
+        Number of complex equations used.
     possible : float
-        Complex equations of all lines.
+        Number of complex equations of all lines.
     iterations : int
+        Number of linearisations.
     converged : bool
+        Whether the iteration converged.
     unknown_cross : UnknownCrossTerms, optional
-        Where cross terms of C are unknown.
+        Statistics of a fit with unknown cross terms of C.
     on : OnManifold, optional
-        Point of the last linearisation, from which other FRFs of the same structure are near; not of long sweeps.
+        Point of the last linearisation, near to other FRFs of the same structure; not for long sweeps.
     """
 
     problem: GroupProblem
@@ -169,7 +174,7 @@ class GroupFit(FormMinimum):
 
     @classmethod
     def of(cls, minimum: FormMinimum, **more: Any) -> GroupFit:
-        """Return a minimum with what belongs to it, and what was computed of it."""
+        """Return a minimum with further attributes, including its computed properties."""
         found = cls(**{one.name: getattr(minimum, one.name) for one in fields(FormMinimum)}, **more)
         vars(found).update(vars(minimum))
         return found
@@ -199,7 +204,7 @@ class GroupFit(FormMinimum):
 
     @property
     def squares(self) -> float:
-        """Squares of the residual; a line that is not used counts as one that just is not."""
+        """Squares of the residual; an omitted line counts with its threshold."""
         return self.cost + FAR * (self.possible - self.equations)
 
     @property
@@ -209,13 +214,13 @@ class GroupFit(FormMinimum):
 
     @property
     def is_noise(self) -> bool:
-        """Whether the residual is no larger than the noise, and hardly a line is not used."""
+        """Whether the residual is no larger than the noise, and nearly all lines are used."""
         possible = max(self.possible, 1.0)
         return bool(self.squares < (_NOISE + _SIGMA / np.sqrt(possible)) * possible)
 
     @property
     def is_good(self) -> bool:
-        """Whether it converged, and the residual is that of the noise."""
+        """Whether it converged with a residual at the level of the noise."""
         return self.converged and self.is_noise
 
     @property
@@ -227,22 +232,23 @@ class GroupFit(FormMinimum):
 def fit_dofs(
     problem: GroupProblem, starts: Iterable[FloatArray], patience: int = PATIENCE, on: OnManifold | None = None
 ) -> GroupFit:
-    """Fit from one start after the other until the residual is that of the noise; else keep the lowest.
+    """Fit from one initial value after the other until the residual is noise; else return the lowest fit.
 
-    A fit may go to and fro without end at a residual that is noise; where two starts lead there, others do, too.
+    A fit may oscillate without end at a residual that is noise; if two initial values lead there, others do, too.
 
     Parameters
     ----------
     problem : GroupProblem
+        FRFs and options.
     starts : iterable of ndarray, shape (p,)
-        Coordinates of the joint.
+        Initial coordinates of the joint.
     patience : int
-        Linearisations from the first start after which a fit far from the data ends.
+        Number of linearisations from the first initial value after which a fit far from the data ends.
     on : OnManifold, optional
-        FRFs near the smooth ones that nearly fit the joint: where their projection begins.
+        FRFs near the smooth ones that nearly fit the joint, as initial value of the projection.
     """
     best: GroupFit | None = None
-    # The kernel fits a joint without cross terms; one of laws, with cross terms or unknown entries is fitted here.
+    # The kernel fits a joint without cross terms; laws, cross terms and unknown entries are fitted here.
     own = _KernelFit.of(problem)
     for start in itertools.islice(starts, _FEW_STARTS if problem.sides_bend else None):
         if not np.isfinite(start).all():
@@ -250,7 +256,7 @@ def fit_dofs(
         try:
             now = patience if best is None else LITTLE_PATIENCE
             found = _iterated(problem, start, now, on) if own is None else own.fit(start, now, on)
-        except np.linalg.LinAlgError:  # K* ran off to infinity: another start may do
+        except np.linalg.LinAlgError:  # K* diverged: try the next initial value
             continue
         again = best is not None and found.is_noise and abs(found.squares - best.squares) < _SAME
         if best is None or found.squares < best.squares:
@@ -265,21 +271,23 @@ def fit_dofs(
 def effects_of(
     fit: GroupFit, changes: Iterable[ComplexArray], lines: slice = slice(None)
 ) -> Iterator[tuple[ComplexArray, FloatArray]]:
-    """Yield what changes of the measured FRFs do at the minimum, line by line.
+    """Yield the effect of changes of the measured FRFs at the minimum, line by line.
 
     Parameters
     ----------
     fit : GroupFit
+        Fit at its minimum.
     changes : iterable of ndarray, shape (n_lines, q)
-        Of the entries of gamma on these lines, m/N.
+        Changes of the entries of gamma on these lines, m/N.
     lines : slice
+        Frequency lines; all by default.
 
     Yields
     ------
     gradient : ndarray, shape (n_lines, p)
-        Its real part is added to the gradient; that of 1j times the change is its imaginary part, negative.
+        Change of the gradient in its real part; minus its imaginary part is the effect of the change multiplied by 1j.
     squares : ndarray, shape (n_lines,)
-        Of the residual that the change alone leaves, in units of the noise.
+        Squares of the residual that the change alone leaves, in units of the noise.
     """
     problem, own = fit.problem, fit.problem.data.on_lines(lines)
     joint = fit.joint.on_lines(lines)
@@ -289,10 +297,10 @@ def effects_of(
     unknown = problem.unknown[lines].reshape(c.shape)
     if unknown.any():
         c = np.where(unknown, smooth_compliance(own), c)
-    # Where cross terms are unknown there is no point of the manifold.
+    # With unknown cross terms there is no point of the manifold.
     on = fit.on if fit.on is not None and not unknown.any() else None
     point = _first_points(own, c) if on is None else OnManifold(on.h[lines], on.q[lines], on.squares[lines])
-    point = _rescued(own, c, point)
+    point = _restarted(own, c, point)
     fitted = own.entries.take(frfs_of_joint(point.h, point.q, c, own.reference))
     here, more = problem._replace(data=own, unknown=problem.unknown[lines]), iter(changes)
     # A form is factorised once for all changes of a call.
@@ -304,7 +312,7 @@ def effects_of(
 
 
 class _KernelFit(NamedTuple):
-    """The fit of a joint of springs without cross terms in the kernel, with the arrays that it takes."""
+    """The fit of a joint of springs without cross terms in the kernel, with its arrays."""
 
     problem: GroupProblem
     joint: DiagonalJoint
@@ -313,7 +321,7 @@ class _KernelFit(NamedTuple):
 
     @classmethod
     def of(cls, problem: GroupProblem) -> _KernelFit | None:
-        """Return the fit of a problem; None where the kernel has none."""
+        """Return the fit of a problem; None if the kernel has none."""
         data, joint = problem.data, problem.joint
         if not isinstance(joint, DiagonalJoint) or data.springs is None or problem.unknown.any():
             return None
@@ -349,7 +357,7 @@ class _KernelFit(NamedTuple):
 def _iterated(
     problem: GroupProblem, start: FloatArray, patience: int = PATIENCE, on: OnManifold | None = None
 ) -> GroupFit:
-    """Linearise, minimise and judge until nothing moves, or no end is in sight."""
+    """Linearise, minimise and test until convergence, or until it is out of reach."""
     data, joint, equations = problem.data, problem.joint, problem.equations()
     lines, choice_of_m, length = _LinesUsed(problem), _ChoiceOfM(problem), _StepLength(start.size)
     unknown = smooth_compliance(data) if problem.unknown.any() else None
@@ -366,20 +374,20 @@ def _iterated(
             else _first_points(data, c)
         )
         if step == 1 or not problem.sides_bend:
-            on = _rescued(data, c, on)
+            on = _restarted(data, c, on)
         before, used = np.count_nonzero(lines.last), lines.near(on, step)
-        # Of lines that come near only now, the joint does not know yet.
+        # Lines that come near only now have not influenced the joint yet.
         is_whole = step > 1 and bool(np.count_nonzero(used) <= before)
-        # Unknown entries of C move on all lines: they may bring a line back to where it is used.
+        # Unknown entries of C change on all lines, so that an omitted line may be used again.
         forms, unknown = _linearised(problem, c, on, used, choice_of_m.prior)
         minimum = joint.lowest(forms, x)
         change, count = minimum.x - x, float(equations[used].sum())
-        # In standard errors along the direction of the step: what the data do not see may go anywhere.
+        # In standard errors along the direction of the step, because undetermined directions are arbitrary.
         moved = float(np.sqrt(abs(2 * (change @ minimum.information @ change))))
         is_lost = minimum.cost > _LOST * count
         converged = choice_of_m.holds_for(minimum, step) and bool(moved < _MOVED * np.sqrt(x.size)) and is_whole
         if length.is_spent and not converged and moved < _SWINGS * np.sqrt(x.size):
-            # Between the two ends, a tenth of the way of which was the last step.
+            # Between the two ends of the last step, of which a tenth was taken.
             minimum, converged = FormMinimum(x, *FormSquares(forms, joint).linearised(x), forms, joint), True
         if converged or step == _MOST or length.is_spent or (is_lost and step > patience):
             kept = None if is_long(len(data.measured)) else on
@@ -388,17 +396,17 @@ def _iterated(
                 iterations=step, converged=converged, on=kept,
             )  # fmt: skip
         x = x + length.of(change, minimum.information, is_lost=is_lost) * change
-        linearised_at = joint.within_sight(minimum, x)
-        # Of a long sweep the forms of one step take as much memory as those of the next.
+        linearised_at = joint.linearisation_point(minimum, x)
+        # For a long sweep the forms of one step take as much memory as the forms of the next.
         del forms, minimum
     raise AssertionError
 
 
 class _LinesUsed:
-    """Which lines are near enough to the manifold; half of them where few are. In a long search none comes back.
+    """Lines near enough to the manifold, at least half of them if few are. In a long search no omitted line returns.
 
-    Few are those that are fewer than the parameters, or than a quarter of all; of so few in all none is left out. FRFs
-    that were not smoothed lie off the manifold by all of their noise, whose level few lines show to a factor.
+    Few means fewer than the parameters, or less than a quarter of all; if all lines are so few, none is omitted. FRFs
+    that were not smoothed differ from the manifold by all of their noise, whose level few lines determine to a factor.
     """
 
     def __init__(self, problem: GroupProblem) -> None:
@@ -423,10 +431,10 @@ class _LinesUsed:
 
 
 class _ChoiceOfM:
-    """Whether M is taken as expected, or as that of the nearest FRFs, which overstates what is known of a stiff joint.
+    """Choice of M: expected, or of the nearest FRFs, which overstates the information on a stiff joint.
 
-    The first step takes M as expected. It shows whether a compliance is poorly determined, and in which case that
-    remains so to the end; a fit with M of the nearest FRFs that finds one is not the last.
+    The first step uses the expected M. It shows whether a compliance is poorly determined, and in this case the choice
+    is kept to the end. A fit with M of the nearest FRFs that finds a poorly determined compliance continues.
     """
 
     def __init__(self, problem: GroupProblem) -> None:
@@ -434,7 +442,7 @@ class _ChoiceOfM:
         self.prior = self._prior
 
     def holds_for(self, minimum: FormMinimum, step: int) -> bool:
-        """Return whether a minimum agrees with the choice made for its step; make that for the next."""
+        """Return whether a minimum agrees with the choice made for its step; choose for the next step."""
         error = np.sqrt(np.maximum(np.diagonal(minimum.covariance), 1e-300))
         poorly = bool((error > _POORLY * abs(minimum.x))[minimum.joint.is_compliance & (self._prior is not None)].any())
         holds = self.prior is not None or not poorly
@@ -443,11 +451,11 @@ class _ChoiceOfM:
 
 
 class _StepLength:
-    """Which part of a step is taken.
+    """Length of a step, as a share of the full step.
 
-    All of it, unless steps lead to and fro and hardly shrink: where all of the last one would have made the next step
-    -r times as long, 1/(1 + r) of it would have ended at the fixed point. From then on parts do not grow: of two minima
-    that are nearly as low, now the one is taken and now the other.
+    Full steps, unless steps oscillate and hardly shrink. If the full last step would have made the next step -r times
+    as long, 1/(1 + r) of it would have ended at the fixed point. From then on the length does not grow, because the
+    iteration would alternate between two minima of nearly equal height.
     """
 
     def __init__(self, p: int) -> None:
@@ -455,11 +463,11 @@ class _StepLength:
 
     @property
     def is_spent(self) -> bool:
-        """Whether the least part is still too much."""
+        """Whether even the least length is too long."""
         return self.share <= _LEAST_SHARE
 
     def of(self, step: FloatArray, information: FloatArray, *, is_lost: bool) -> float:
-        """Return the part of a step; all of it far from the data."""
+        """Return the length of a step; a full step far from the data."""
         last, self.last = self.last, step
         own, before = float(step @ information @ step), float(last @ information @ last)
         if is_lost:
@@ -473,14 +481,14 @@ class _StepLength:
 
 
 def _first_points(data: LineData, c: ComplexArray) -> OnManifold:
-    """Start on every line, in chunks of lines."""
+    """Return initial points on every line, in chunks of lines."""
     return OnManifold(*in_pieces(len(c), lambda own: starts_on_manifold(data.on_lines(own), c[own], _FIRST_STEPS)))
 
 
 def _linearised(
     problem: GroupProblem, c: ComplexArray, on: OnManifold, used: NDArray[np.bool_], prior: PriorOfM | None
 ) -> tuple[LineForms, ComplexArray | None]:
-    """Return forms of the coordinates, lines that are not used weighing nothing, and the unknown entries; in chunks."""
+    """Return forms of the coordinates, zero on lines that are not used, and the unknown entries; in chunks."""
     found = np.zeros_like(c) if problem.unknown.any() else None
 
     def of_lines(own: slice) -> Sequence[NDArray[Any]]:
@@ -506,8 +514,8 @@ def _unit_places(data: LineData) -> NDArray[np.intp]:
     return a * data.entries.n + b
 
 
-def _rescued(data: LineData, c: ComplexArray, on: OnManifold) -> OnManifold:
-    """Give lines far from the manifold other starts."""
+def _restarted(data: LineData, c: ComplexArray, on: OnManifold) -> OnManifold:
+    """Return points with new initial values on lines far from the manifold."""
     far = np.flatnonzero(~(on.squares <= FAR * data.entries.n**2))
     if far.size == 0 or far.size == len(c):
         return on
@@ -523,8 +531,8 @@ def _rescued(data: LineData, c: ComplexArray, on: OnManifold) -> OnManifold:
 def _of_coordinates(problem: GroupProblem, several: Sequence[LineForms]) -> tuple[list[LineForms], ComplexArray | None]:
     """Return the forms of one linearisation in the entries of C that the coordinates change.
 
-    Entries of C that are unknown on a line are eliminated; the inverse of their weights, zero elsewhere, is returned,
-    too, where there are any. All others that the coordinates do not change are zero.
+    Entries of C that are unknown on a line are eliminated; the function also returns the inverse of their weights, zero
+    elsewhere, if there are any. All further entries that the coordinates do not change are zero.
     """
     n, places, joint = problem.data.entries.n, _unit_places(problem.data), problem.joint
     unknown, inverse = problem.unknown[:, places], None
@@ -534,7 +542,7 @@ def _of_coordinates(problem: GroupProblem, several: Sequence[LineForms]) -> tupl
     gradients = [forms.gradient for forms in several]
     upper, lower = joint.rows * n + joint.columns, joint.columns * n + joint.rows
     if places.size == n * n > len(upper) > n:
-        # C is symmetric, and all its entries are there.
+        # C is symmetric, and all its entries are present.
         fold = (places[:, None] == upper).astype(float) + ((places[:, None] == lower) & (upper != lower))
         compliance, weight = compliance[:, upper], fold.T @ weight @ fold
         gradients = [gradient @ fold for gradient in gradients]
@@ -551,7 +559,7 @@ def _of_coordinates(problem: GroupProblem, several: Sequence[LineForms]) -> tupl
 
 
 def _eliminated(several: Sequence[LineForms], unknown: NDArray[np.bool_]) -> tuple[list[LineForms], ComplexArray]:
-    """Minimise forms of the same weights over their unknown entries; return the inverse of these weights, too."""
+    """Minimise forms of the same weights over their unknown entries; return also the inverse of these weights."""
     w = several[0].weight
     size = np.sqrt(np.maximum(np.einsum("lqq->lq", w).real, TINY))
     outer = size[:, :, None] * size[:, None, :]
@@ -560,7 +568,8 @@ def _eliminated(several: Sequence[LineForms], unknown: NDArray[np.bool_]) -> tup
     inverse = np.where(both, np.linalg.pinv(masked, hermitian=True), 0) / outer
     across, known = w @ inverse, ~unknown
     weight = (w - across @ w) * known[:, :, None] * known[:, None, :]
-    # Of all forms at once, shape (n_freq, q, n_forms).
+    # All forms at once, shape (n_freq, q, n_forms).
+
     p = np.stack([forms.gradient for forms in several], axis=2)
     gradient = (p - across @ p) * known[:, :, None]
     taken = (p.conj() * (inverse @ p)).real.sum(axis=1)

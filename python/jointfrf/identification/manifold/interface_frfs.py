@@ -1,4 +1,4 @@
-"""FRFs between channels, taken to the joint DOFs with the full covariance of their noise."""
+"""FRFs between channels, converted to the joint DOFs with the full covariance of their noise."""
 
 from __future__ import annotations
 
@@ -22,37 +22,37 @@ NumbersT = TypeVar("NumbersT", ComplexArray, FloatArray)
 #: A smooth FRF below this share of sqrt|h_pp h_qq| and of its own noise is zero by symmetry.
 _ZERO = 1e-8
 _BELOW_NOISE = 1.0
-#: By how much the square of an error of the models counts in the variance of a line: it is the same error on all lines,
-#: and so counts for more than noise does. By trial on simulated pairs: 1 to 10 are nearly as good.
+#: Weight of the square of a model error in the variance of a line: it is the same error on all lines, and so counts for
+#: more than noise does. By trial on simulated pairs: 1 to 10 are nearly as good.
 _ERRORS = 3.0
-#: Part of its variance that an entry keeps when all others are known.
+#: Least part of the variance of an entry that remains if all further entries are known.
 _OWN_NOISE = 1e-9
 
 
 class InterfaceFrfs(NamedTuple):
-    """FRFs of channels with their noise, and how joint DOFs are made of them: gamma = T_r h T_f^T.
+    """FRFs of channels with their noise, and their conversion to joint DOFs: gamma = T_r h T_f^T.
 
     Attributes
     ----------
     measured : ndarray, shape (n_freq, m_r, m_f)
-        Between the channels, m/N.
+        Measured FRFs between the channels, m/N.
     smooth : ndarray, shape (n_freq, q)
         Smooth FRFs between the joint DOFs, m/N: the entries of `FrfEntries`.
     variance : ndarray, shape (n_freq, m_r, m_f)
-        E|e|^2 of the measured FRFs, (m/N)^2; inf where one is not used.
+        Noise variance E|e|^2 of the measured FRFs, (m/N)^2; inf if one is not used.
     responses, forces : ndarray, shapes (2 n, m_r), (2 n, m_f)
-        From channels to joint DOFs j, then k.
+        Matrices from channels to joint DOFs j, then k.
     reciprocal : bool
-        Whether gamma_pq and gamma_qp are one.
+        Whether gamma_pq and gamma_qp are equal.
     symmetrised : bool
-        Whether h_pq and h_qp are one measurement, as where FRFs were made reciprocal before.
+        Whether h_pq and h_qp are one measurement, because the FRFs were made reciprocal before.
     response_modes, force_modes : ndarray, shapes (m_r, 2 n), (m_f, 2 n), optional
-        Motion of the channels for a unit of each joint DOF where the sides are rigid; None where it is not known.
+        Motion of the channels for a unit of each joint DOF if the sides are rigid; None if it is not known.
     errors : ndarray, shape (n_freq, e, q), optional
-        By how much the FRFs between the joint DOFs change when something of the models that corrected them is off by
-        one standard deviation, m/N.
+        Change of the FRFs between the joint DOFs by each error of the correcting models, one standard deviation, m/N.
     noise_paths : pair of ndarray, shapes (n_freq, 2 n, m_r), (n_freq, 2 n, m_f), optional
-        From noise of the channels to that of FRFs which models have corrected, in place of `responses` and `forces`.
+        Matrices from noise of the channels to noise of FRFs that models have corrected, in place of `responses` and
+        `forces`.
     """
 
     measured: ComplexArray
@@ -103,7 +103,7 @@ class InterfaceFrfs(NamedTuple):
         return between(self.responses, h, self.forces)
 
     def line_stiffness(self) -> ComplexArray:
-        """Return K*(w) of each line alone, shape (n_freq, n, n), N/m; NaN where it cannot be inverted."""
+        """Return K*(w) of each line alone, shape (n_freq, n, n), N/m; NaN if it cannot be inverted."""
         h = self.measured
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", IllConditionedWarning)
@@ -120,7 +120,7 @@ class InterfaceFrfs(NamedTuple):
         return found
 
     def without(self, variance: FloatArray) -> InterfaceFrfs:
-        """Return the same with a part of the variance left out."""
+        """Return the same without a part of the variance."""
         with np.errstate(invalid="ignore"):
             rest = self.variance - variance
         return self._replace(variance=np.where(np.isfinite(self.variance), rest, np.inf))
@@ -128,7 +128,7 @@ class InterfaceFrfs(NamedTuple):
     def groups(self) -> list[NDArray[np.intp]]:
         """Joint DOFs between which FRFs are zero, to rounding or within their noise, on all lines.
 
-        Each group is a separate problem: where a structure is symmetric, the FRFs between some DOFs vanish.
+        Each group is a separate problem: in a symmetric structure, the FRFs between some DOFs vanish.
         """
         n, smooth = self.n, self.smooth_gamma
         squares = smooth.real**2 + smooth.imag**2
@@ -149,8 +149,8 @@ class InterfaceFrfs(NamedTuple):
         frfs = self if self.noise_paths is not None else self._with_channels_of(at)
         t_r, t_f = frfs.responses[at], frfs.forces[at]
         share = None
-        # Shares by channel do not commute with models of the sides, which carry noise between channels: those of h_pq
-        # and h_qp are then a half.
+        # Shares by channel do not commute with models of the sides, which mix noise of channels: the shares of h_pq and
+        # h_qp are then a half.
         is_square = np.array_equal(self.responses, self.forces)
         if self.reciprocal and not self.symmetrised and is_square and self.noise_paths is None:
             share = direction_share(frfs.variance)
@@ -169,7 +169,7 @@ class InterfaceFrfs(NamedTuple):
         return LineData(entries, measured, self.smooth_of(dofs), *weights)
 
     def _with_channels_of(self, at: NDArray[np.intp]) -> InterfaceFrfs:
-        """Return the same without channels that some joint DOFs do not take; what is there where they take all."""
+        """Return the same without channels that some joint DOFs do not use; the object itself if they use all."""
         rows, columns = (np.flatnonzero(t[at].any(axis=0)) for t in (self.responses, self.forces))
         if (rows.size, columns.size) == self.measured.shape[1:]:
             return self
@@ -179,16 +179,16 @@ class InterfaceFrfs(NamedTuple):
         )  # fmt: skip
 
     def smooth_of(self, dofs: NDArray[np.intp]) -> ComplexArray:
-        """Return the smooth FRFs between some joint DOFs, shape (n_freq, q); what is there where these are all."""
+        """Return the smooth FRFs between some joint DOFs, shape (n_freq, q); without a copy if these are all."""
         entries = self._places_of(dofs)
         return self.smooth if np.array_equal(entries, np.arange(self.smooth.shape[1])) else self.smooth.take(entries, 1)
 
     def errors_of(self, dofs: NDArray[np.intp]) -> ComplexArray | None:
-        """Return the errors of FRFs between some joint DOFs, shape (n_freq, e, q); None where there are none."""
+        """Return the errors of FRFs between some joint DOFs, shape (n_freq, e, q); None if there are none."""
         return None if self.errors is None else self.errors.take(self._places_of(dofs), 2)
 
     def _places_of(self, dofs: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Return which entries those between some joint DOFs are."""
+        """Return the numbers of the entries between some joint DOFs."""
         at = np.concatenate([dofs, dofs + self.n])
         own = FrfEntries.of(len(dofs), reciprocal=self.reciprocal)
         places: NDArray[np.intp] = FrfEntries.of(self.n, reciprocal=self.reciprocal).places
@@ -201,7 +201,7 @@ class InterfaceFrfs(NamedTuple):
         return entries.take(_mean(gamma[:, at[:, None], at], self.reciprocal))
 
     def _made_reciprocal(self, share: FloatArray) -> InterfaceFrfs:
-        """Return the same with the means of h_pq and h_qp, one measurement each; not used where one is not."""
+        """Return the same with the means of h_pq and h_qp, one measurement each; not used if one is not used."""
         known = np.isfinite(self.variance)
         own = np.where(known, share**2 * np.where(known, self.variance, 0), np.inf)
         diagonal = np.eye(len(share), dtype=bool)
@@ -267,7 +267,7 @@ class InterfaceFrfs(NamedTuple):
         sides = entries.rows // n + entries.columns // n
         for block in (np.flatnonzero(sides == one) for one in np.unique(sides)):
             p, q = entries.rows[block], entries.columns[block]
-            # Entry i is a sum over pairs of channels h_ab, of those that enter the block at all.
+            # Entry i is a sum over pairs of channels h_ab, over those that enter the block at all.
             ways = [(p, q), (q, p)] if self.reciprocal else [(p, q)]
             used = [((t_r[:, i] != 0).any(axis=0), (t_f[:, k] != 0).any(axis=0)) for i, k in ways]
             pairs = np.any([(own[:, :, None] & other[:, None]).any(axis=0) for own, other in used], axis=0)
@@ -282,7 +282,7 @@ class InterfaceFrfs(NamedTuple):
             parts = np.concatenate([weighted.real, weighted.imag], axis=2)
             covariance: FloatArray = parts @ parts.swapaxes(1, 2)
             if errors is not None:
-                # Real and imaginary part each as a direction of its own: the covariance stays real.
+                # Real and imaginary part are separate directions, so that the covariance stays real.
                 own = np.concatenate([errors.real, errors.imag], axis=1)[:, :, block]
                 covariance += _ERRORS * own.swapaxes(1, 2) @ own
             total = np.einsum("lqq->lq", covariance)
@@ -300,15 +300,15 @@ def _mean_product(
     ways: list[tuple[NDArray[np.intp], NDArray[np.intp]]],
     pairs: tuple[NDArray[np.intp], NDArray[np.intp]],
 ) -> ComplexArray:
-    """Return what pairs of channels have in entries, in the mean over the ways to them, shape (n_freq, q, n_pairs)."""
+    """Return the mean contribution of pairs of channels to entries, over the paths to them, (n_freq, q, n_pairs)."""
     total: ComplexArray = np.sum([t_r[:, p][:, :, pairs[0]] * t_f[:, q][:, :, pairs[1]] for p, q in ways], axis=0)
     return total / len(ways)
 
 
 def direction_share(variance: FloatArray) -> FloatArray:
-    """Return which share h_pq has in the mean of h_pq and h_qp, by their variances E|e|^2, shape (m, m).
+    """Return the share of h_pq in the mean of h_pq and h_qp, by their variances E|e|^2, shape (m, m).
 
-    The same on all lines: variances that follow measured FRFs would favour the smaller one of each line.
+    It is the same on all lines, because variances that follow measured FRFs would favour the smaller one of each line.
     """
     some = variance[spread_lines(len(variance))]
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -318,19 +318,19 @@ def direction_share(variance: FloatArray) -> FloatArray:
 
 
 def mean_of_directions(h: ComplexArray, share: FloatArray) -> ComplexArray:
-    """Return the mean of h_pq and h_qp, the former with this share, shape (n_freq, m, m)."""
+    """Return the mean of h_pq and h_qp, h_pq with this share, shape (n_freq, m, m)."""
     own = share * h
     mean: ComplexArray = own + own.swapaxes(1, 2)
     return mean
 
 
 def _mean(gamma: ComplexArray, reciprocal: bool) -> ComplexArray:
-    """Return the mean of gamma_pq and gamma_qp where they are one."""
+    """Return the mean of gamma_pq and gamma_qp if they are equal."""
     return (gamma + gamma.swapaxes(-2, -1)) / 2 if reciprocal else gamma
 
 
 def taken(h: NumbersT, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NumbersT:
-    """Return rows and columns of every line; what is there where these are all, in order."""
+    """Return rows and columns of every line; without a copy if these are all, in order."""
     whole = len(rows) == h.shape[1] and len(columns) == h.shape[2]
     if whole and (np.diff(rows) == 1).all() and (np.diff(columns) == 1).all():
         return h
@@ -338,19 +338,19 @@ def taken(h: NumbersT, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Num
 
 
 def between(t_r: FloatArray, h: NumbersT, t_f: FloatArray) -> NumbersT:
-    """Return T_r h T_f^T of every line; where the rows of both are those of unit matrices, without products."""
+    """Return T_r h T_f^T of every line; without products if all rows of both are rows of unit matrices."""
     if all(np.count_nonzero(t) == len(t) and (t.max(axis=1) == 1).all() for t in (t_r, t_f)):
         return taken(h, t_r.argmax(axis=1), t_f.argmax(axis=1))
     return t_r @ h @ t_f.T
 
 
 def _inverse_root(variance: FloatArray, dead: NDArray[np.bool_]) -> FloatArray:
-    """Return one over the standard deviation, 0 for what is dead."""
+    """Return one over the standard deviation, 0 for dead entries."""
     return np.asarray(np.where(dead, 0, 1 / np.sqrt(np.where(dead, 1, variance))))
 
 
 def _blocks(g: FloatArray) -> list[NDArray[np.intp]]:
-    """Entries that share channels: those within a side, and those between the sides."""
+    """Return groups of entries that share channels: within a side, and between the sides."""
     used = (g != 0).astype(float)
     label = connected(used @ used.T > 0)
     return [np.flatnonzero(label == one) for one in range(label.max() + 1)]
@@ -370,7 +370,7 @@ def _whitening(g: FloatArray, variance: FloatArray, inverse_std: FloatArray, dea
 def _triangles(covariance: FloatArray, dead: NDArray[np.bool_]) -> FloatArray:
     """Return the inverse of the triangles of covariances of unit variance, which may be overwritten."""
     n = covariance.shape[1]
-    # DOFs made of the same channels may leave an entry without noise of its own.
+    # DOFs that share all channels may leave an entry without independent noise.
     covariance[:, range(n), range(n)] += dead + _OWN_NOISE
     inverse: FloatArray = np.linalg.inv(np.linalg.cholesky(covariance))
     return inverse

@@ -26,10 +26,10 @@ __all__ = [
     "NamedParameter",
 ]
 
-#: Steps of a minimiser at most.
+#: Maximum number of steps of a minimiser.
 STEPS = 100
-#: A minimum is found when two steps gain less than this of the squares of one residual, or one step promises less than
-#: a share of that.
+#: Convergence: two steps decrease the sum of squares by less than this share of the squares of one residual, or one
+#: step predicts a decrease below a share of it.
 LEAST_GAIN, _PROMISED = 1e-6, 1e-3
 
 
@@ -39,13 +39,13 @@ class LineForms(NamedTuple):
     Attributes
     ----------
     compliance : ndarray, shape (n_freq, q)
-        Entries of C about which is linearised, C0, m/N.
+        Entries C0 of C at the linearisation point, m/N.
     weight : ndarray, shape (n_freq, q, q)
-        Information W on them.
+        Information W on these entries.
     gradient : ndarray, shape (n_freq, q)
-        p, the weighted residual there.
+        Weighted residual p at this point.
     squares : ndarray, shape (n_freq,)
-        c0, squares of the residual there.
+        Squares c0 of the residual at this point.
     """
 
     compliance: ComplexArray
@@ -78,10 +78,12 @@ class FormSquares:
     Parameters
     ----------
     forms : LineForms
+        Forms of all lines.
     joint : JointCoordinates
+        Coordinates of the joint.
     """
 
-    #: A complex residual has the mean square 1: its real and imaginary part 1/2 each.
+    #: A complex residual has the mean square 1, 1/2 in its real and in its imaginary part.
     unit = 0.5
 
     def __init__(self, forms: LineForms, joint: JointCoordinates) -> None:
@@ -94,7 +96,7 @@ class FormSquares:
         return np.full(x.size, np.inf)
 
     def _at(self, x: FloatArray) -> tuple[float, ComplexArray, ComplexArray]:
-        """Return the sum, the entries of C and the weighted residual; those of the last coordinates are kept."""
+        """Return the sum, the entries of C and the weighted residual; the last result is cached."""
         if self._last is None or not np.array_equal(self._last[0], x):
             entries = self.joint.compliance(x)
             with np.errstate(all="ignore"):
@@ -104,31 +106,33 @@ class FormSquares:
         return self._last[1:]
 
     def cost(self, x: FloatArray) -> float:
-        """Return the sum of the squares; inf where K* is singular."""
+        """Return the sum of the squares; inf if K* is singular."""
         return self._at(x)[0]
 
     def linearised(self, x: FloatArray) -> NormalEquations:
-        """Return it with its derivatives."""
+        """Return the sum of the squares with its derivatives."""
         cost, entries, residual = self._at(x)
         return NormalEquations(cost, *self.joint.normal_equations(x, entries, self.forms.weight, residual))
 
 
 @dataclass(frozen=True)
 class FormMinimum:
-    """A minimum.
+    """A minimum of quadratic forms.
 
     Attributes
     ----------
     x : ndarray, shape (p,)
         Coordinates of the joint.
     cost : float
-        Sum of the squares; inf where no step was possible.
+        Sum of the squares; inf if no step was possible.
     information : ndarray, shape (p, p)
-        Re(J^H W J), half the second derivative.
+        Half the second derivative, Re(J^H W J).
     gradient : ndarray, shape (p,)
-        Re(J^H r): zero but for coordinates at their bound.
+        Minus half the gradient, Re(J^H r): zero except for coordinates at a bound.
     forms : LineForms
+        Minimised forms.
     joint : JointCoordinates
+        Coordinates of the joint.
     """
 
     x: FloatArray
@@ -139,13 +143,13 @@ class FormMinimum:
     joint: JointCoordinates
 
     def of_lines(self, lines: slice = slice(None)) -> LineParts:
-        """Return the parts of neighbouring lines; those of a long sweep are not kept."""
+        """Return the parts of neighbouring lines; the parts of a long sweep are not kept."""
         if is_long(len(self.forms.squares)):
             return self._parts(lines)
         return LineParts(*(part[lines] for part in self._all_parts))
 
     def of_groups(self, member: FloatArray) -> LineParts:
-        """Return the sums over groups of lines; `member`, shape (n_groups, n_freq), says how much of a line."""
+        """Return the sums over groups of lines; `member`, shape (n_groups, n_freq), is the share of each line."""
         gradient, information = np.zeros((len(member), self.x.size)), np.zeros((len(member), *self.information.shape))
         for own in line_slices(member.shape[1]):
             part = self.of_lines(own)
@@ -155,7 +159,7 @@ class FormMinimum:
 
     @cached_property
     def covariance(self) -> FloatArray:
-        """Covariance of the coordinates where the squares are in units of independent noise, shape (p, p)."""
+        """Covariance of the coordinates for squares in units of independent noise, shape (p, p)."""
         return inverse_information(2 * self.information)
 
     @cached_property
@@ -185,22 +189,22 @@ class JointCoordinates(ABC):
     parameters : sequence, length p
         Parameters of the joint in the order of the coordinates.
     omega : ndarray, shape (n_freq,)
-        rad/s.
+        Angular frequencies, rad/s.
     n : int
-        Joint DOFs.
+        Number of joint DOFs.
     rows, columns : ndarray of int, shape (q,)
         Entries of R that the coordinates change, on and above its diagonal.
     lower, upper : ndarray, shape (p,)
         Smallest and largest value of each coordinate.
     dofs : ndarray of int, shape (p,)
-        DOF of each parameter, of a cross term that of its row.
+        DOF of each parameter; for a cross term the DOF of its row.
     is_stiffness : ndarray of bool, shape (p,)
         Parameters that are the stiffness of one DOF.
     in_compliance : bool
         Whether the coordinates of stiffnesses are compliances a = 1/(k + z), 0 for a rigid DOF, and the coordinates of
         damping their rates: the n compliances first.
     rate_of_one : ndarray
-        Rates at which damping is as large as stiffness on the highest line; of those coordinates only.
+        Rates at which damping is as large as stiffness on the highest line; only for these coordinates.
     springs : ndarray, shape (n,)
         Reference springs Z, N/m or N m/rad.
     """
@@ -235,7 +239,7 @@ class JointCoordinates(ABC):
         return slope
 
     def may_be_rigid(self, i: int) -> bool:
-        """Whether a parameter is of a DOF whose coordinate is its compliance."""
+        """Return whether the coordinate of a parameter's DOF is its compliance."""
         return False
 
     @abstractmethod
@@ -248,7 +252,7 @@ class JointCoordinates(ABC):
 
     @abstractmethod
     def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
-        """Return their derivatives by the coordinates, shape (n_freq, q, p)."""
+        """Return the derivatives of these entries by the coordinates, shape (n_freq, q, p)."""
 
     @abstractmethod
     def theta(self, x: FloatArray) -> FloatArray:
@@ -263,7 +267,7 @@ class JointCoordinates(ABC):
         """Return the derivatives of the parameters by the coordinates, shape (p, p)."""
 
     def matrix(self, entries: ComplexArray) -> ComplexArray:
-        """Return R of its entries, shape (n_freq, n, n); zero where the coordinates change nothing."""
+        """Return R of its entries, shape (n_freq, n, n); zero for entries that the coordinates do not change."""
         c = np.zeros((len(entries), self.n, self.n), np.complex128)
         c[:, self.rows, self.columns] = c[:, self.columns, self.rows] = entries
         return c
@@ -291,11 +295,14 @@ class JointCoordinates(ABC):
         Parameters
         ----------
         forms : LineForms
+            Quadratic forms.
         start : ndarray, shape (p,)
+            Initial coordinates.
         held : int, optional
-            A coordinate that keeps its value.
+            Number of a coordinate that stays fixed.
         least_gain : float
-            The iteration ends when two steps in a row lower the squares by less; a residual has mean square 1.
+            Decrease of the squares in two successive steps below which the iteration ends; a residual has mean square
+            1.
         """
         squares = FormSquares(forms, self)
         small = least_gain / squares.unit
@@ -305,15 +312,15 @@ class JointCoordinates(ABC):
     def lowest(
         self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = LEAST_GAIN
     ) -> FormMinimum:
-        """Minimise as `minimise` does, from other starts, too, where a minimum may not be the lowest."""
+        """Minimise like `minimise`, and from further initial values if a minimum may not be the lowest."""
         return self.minimise(forms, start, held, least_gain)
 
-    def within_sight(self, minimum: FormMinimum, x: FloatArray) -> FloatArray:
-        """Return where to linearise near coordinates x, by what a minimum shows to be known."""
+    def linearisation_point(self, minimum: FormMinimum, x: FloatArray) -> FloatArray:
+        """Return coordinates for a linearisation near x, limited to the resolution of the data at a minimum."""
         return x
 
     def has_profile(self, i: int, x: FloatArray, covariance: FloatArray) -> bool:
-        """Whether noise is so far from normal in a coordinate that the interval of its parameter needs a profile."""
+        """Return whether noise is so far from normal in a coordinate that its interval needs a profile."""
         return False
 
     def of_profile(self, i: int) -> JointCoordinates:
@@ -325,9 +332,9 @@ class JointCoordinates(ABC):
         return float(self.theta(x)[i])
 
     def end(self, i: int, sign: int) -> float:
-        """Return what a parameter runs to where its coordinate has no limit below (-1) or above (1)."""
+        """Return the limit of a parameter whose coordinate is unbounded below (-1) or above (1)."""
         return sign * np.inf
 
     def longest_reach(self, i: int) -> float:
-        """Return how far from a minimum the limit of a parameter is sought first at most."""
+        """Return the largest distance from a minimum for the first search of a limit."""
         return np.inf

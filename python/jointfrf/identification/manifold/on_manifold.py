@@ -44,21 +44,21 @@ __all__ = [
 ]
 
 _Numbers = TypeVar("_Numbers", ComplexArray, FloatArray)
-#: Lines whose squares exceed the median by this factor are started again.
+#: Ratio of squares to their median above which a line starts again.
 _FAR_OFF = 4
-#: A line has arrived when a step gains less than this of the squares, in units of the noise.
+#: Decrease of the squares, in units of the noise, below which the projection of a line has converged.
 _GAIN = 1e-5
 
 
 class FrfEntries(NamedTuple):
-    """Which entries of the FRFs of one line are used, and the unit matrices of what is free on it.
+    """Entries of the FRFs of one line that are used, and the unit matrices of its free unknowns.
 
     Attributes
     ----------
     n : int
-        Joint DOFs.
+        Number of joint DOFs.
     rows, columns : ndarray of int, shape (q,)
-        Entries of gamma, shape (2 n, 2 n): its upper triangle where the structure is reciprocal, else all.
+        Entries of gamma, shape (2 n, 2 n): its upper triangle if the structure is reciprocal, else all.
     units : ndarray, shape (u, n, n)
         Symmetric unit matrices, or all unit matrices.
     """
@@ -135,12 +135,13 @@ class LineData(NamedTuple):
     Attributes
     ----------
     entries : FrfEntries
+        Entries used.
     measured, smooth : ndarray, shape (n_freq, q)
-        Entries of gamma, m/N.
+        Entries of measured and smooth gamma, m/N.
     inverse_std : ndarray, shape (n_freq, q)
-        1/sqrt(E|e|^2) of the measured entries; 0 where an entry is not used.
+        Inverse standard deviations 1/sqrt(E|e|^2) of the measured entries; 0 if an entry is not used.
     correlation : ndarray, shape (n_freq, q, q), optional
-        Where noise of entries is correlated, lower triangles L that make entries of unit variance uncorrelated.
+        Lower triangles L that make entries of unit variance uncorrelated, if their noise is correlated.
     springs : ndarray, shape (n,), optional
         Reference springs Z of the form, N/m or N m/rad; none by default.
     """
@@ -168,7 +169,7 @@ class LineData(NamedTuple):
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
-        """The arrays by line: FRFs, noise, and its correlation where there is one."""
+        """Arrays by line: FRFs, noise, and its correlation if there is one."""
         arrays = self.measured, self.smooth, self.inverse_std
         return arrays if self.correlation is None else (*arrays, self.correlation)
 
@@ -186,12 +187,12 @@ class LineData(NamedTuple):
 
     @property
     def whitening_order(self) -> int:
-        """Order of the whitening matrices, 0 where there are none."""
+        """Order of the whitening matrices, 0 if there are none."""
         return 0 if self.correlation is None else self.correlation.shape[1]
 
     @property
     def whitening(self) -> FloatArray:
-        """The whitening matrices as the kernel takes them; numbers that it does not read where there are none."""
+        """Whitening matrices as argument of the kernel; unused numbers if there are none."""
         return (
             np.zeros((len(self.smooth), 1, 1)) if self.correlation is None else np.ascontiguousarray(self.correlation)
         )
@@ -231,18 +232,19 @@ def project(target: ComplexArray, data: LineData, r: ComplexArray, start: OnMani
     target : ndarray, shape (n_freq, q)
         Entries of FRFs, m/N.
     data : LineData
-        Their weights.
+        Weights of the entries.
     r : ndarray, shape (n_freq, n, n)
         Compliance R of the joint with the reference springs of the data, m/N.
     start : OnManifold
-        Its squares are not used.
+        Initial H and Q; its squares are not used.
     steps : int
-        At most.
+        Maximum number of steps.
 
     Returns
     -------
     OnManifold
-        Squares are infinite, and H and Q those of the start, where the line holds NaN or Inf or the start overflows.
+        Nearest FRFs. If a line contains NaN or Inf, or the start overflows, squares are infinite, and H and Q are the
+        initial ones.
     """
     n_freq = len(target)
     h, q = (np.array(x, np.complex128, order="C") for x in (start.h, start.q))
@@ -264,16 +266,18 @@ def normal_forms(data: LineData, r: ComplexArray, on: OnManifold, targets: tuple
     Parameters
     ----------
     data : LineData
+        Weights of the entries.
     r : ndarray, shape (n_freq, n, n)
+        Compliance R of the joint with the reference springs of the data, m/N.
     on : OnManifold
-        Point about which is linearised.
+        Point of the linearisation.
     targets : tuple of ndarray, shape (n_freq, q)
-        Entries of FRFs.
+        Entries of FRFs, m/N.
 
     Returns
     -------
     list of LineForms
-        One for each of `targets`; entries of R are by the unit matrices of `FrfEntries`. NaN where a line holds NaN or
+        One for each of `targets`; entries of R are by the unit matrices of `FrfEntries`. NaN if a line contains NaN or
         Inf.
     """
     entries, n_freq = data.entries, len(r)
@@ -295,24 +299,25 @@ def normal_forms(data: LineData, r: ComplexArray, on: OnManifold, targets: tuple
 
 
 def _lines(data: LineData, gamma: ComplexArray, r: ComplexArray) -> tuple[NDArray[Any], ...]:
-    """Return springs, FRFs, weights, whitening and R as the kernel takes them."""
+    """Return springs, FRFs, weights, whitening and R as arguments of the kernel."""
     weights = data.entries.matrix(data.inverse_std)
     return data.reference, gamma, weights, data.whitening, np.ascontiguousarray(r, np.complex128)
 
 
 def starts_on_manifold(data: LineData, r: ComplexArray, steps: int) -> OnManifold:
-    """Find the FRFs nearest to the smooth ones that fit a joint; the best of several starts of a line.
+    """Find the FRFs nearest to the smooth ones that fit a joint; the best of several initial values of a line.
 
     Parameters
     ----------
     data : LineData
+        FRFs with their weights.
     r : ndarray, shape (n_freq, n, n)
         Compliance R of the joint with the reference springs of the data, m/N.
     steps : int
-        Steps of the projection at most.
+        Maximum number of steps of the projection.
     """
     gamma, n = data.entries.matrix(data.smooth), data.entries.n
-    # A view: what was found replaces gamma_jj where the next starts are sought.
+    # A view: the result replaces gamma_jj before the next initial values are computed.
     h = gamma[:, :n, :n]
     best = OnManifold(h, np.zeros_like(h), np.full(len(r), np.inf))
     for first_q in _FIRST_WITH_SPRINGS if data.reference.any() else _FIRST:
@@ -369,7 +374,7 @@ def _inverse(a: ComplexArray) -> ComplexArray:
     return invert(a, on_singular="nan")
 
 
-#: Algebraic first values of Q, exact without noise; none last.
+#: Algebraic initial values of Q, exact without noise; none last.
 _FIRST: tuple[Callable[[ComplexArray, ComplexArray, FloatArray], ComplexArray], ...] = (
     _from_jk,
     _from_kj,
@@ -381,7 +386,7 @@ _FIRST_WITH_SPRINGS = (_from_kk, _from_kj, _FIRST[-1])
 
 
 def smooth_compliance(data: LineData) -> ComplexArray:
-    """Return R of the smooth FRFs, shape (n_freq, n, n), m/N; zero where they do not give it.
+    """Return R of the smooth FRFs, shape (n_freq, n, n), m/N; zero if they do not determine it.
 
     With F0 = gamma_jj^-1 gamma_jk and P = gamma_kk - gamma_kj F0, R = P (F0 + Z P)^-1.
     """
@@ -400,12 +405,12 @@ def smooth_compliance(data: LineData) -> ComplexArray:
     return found
 
 
-#: Smooth FRFs have at least this share of the noise.
+#: Least error of smooth FRFs, as a share of the noise.
 _LEAST_SHARE = 0.2
 
 
 class PriorOfM(NamedTuple):
-    """What is known of M before the FRFs are looked at, and how well they show it.
+    """Prior of M, and the precision with which FRFs show it.
 
     Attributes
     ----------
@@ -424,7 +429,7 @@ class PriorOfM(NamedTuple):
 
 
 def prior_of_m(data: LineData) -> PriorOfM:
-    """Return the prior: entries of M are as large as those of gamma_jj^-1, there and elsewhere in the band."""
+    """Return the prior: entries of M are as large as entries of gamma_jj^-1 on the line and elsewhere in the band."""
     n = data.entries.n
 
     def of_lines(own: slice) -> tuple[FloatArray, FloatArray]:
@@ -436,27 +441,29 @@ def prior_of_m(data: LineData) -> PriorOfM:
     size, squares = in_pieces(len(data.smooth), of_lines)
     np.hypot(size, medians(size.T).T, out=size)
     size[size == 0] = np.finfo(float).tiny
-    # Of FRFs that were not smoothed, nothing is left: their error is the noise.
+    # Without smoothing nothing is left: the error of the FRFs is the noise.
     left = squares.sum() / max(np.count_nonzero(data.inverse_std), 1)
     return PriorOfM(size, float(np.sqrt(np.clip(1 - left, _LEAST_SHARE**2, 1))))
 
 
 def expected_m(data: LineData, r: ComplexArray, on: OnManifold, prior: PriorOfM) -> OnManifold:
-    """Move from the FRFs nearest to the smooth ones to those of the expected M, and of the H that belongs to it.
+    """Return the FRFs of the expected M and the corresponding H, from the FRFs nearest to the smooth ones.
 
     Parameters
     ----------
     data : LineData
+        FRFs with their weights.
     r : ndarray, shape (n_freq, n, n)
         Compliance R of the joint with the reference springs of the data, m/N.
     on : OnManifold
-        The nearest FRFs; their squares are kept.
+        Nearest FRFs; their squares are kept.
     prior : PriorOfM
+        Prior of M.
 
     Notes
     -----
-    The mean of M where it is normal about 0 and the error of the smooth FRFs is normal: the least squares of both
-    together, by one Gauss-Newton step for H and Q. Where FRFs show M well, it stays as it is.
+    The expectation of M for a normal prior about 0 and a normal error of the smooth FRFs. Both together are a least
+    squares problem, solved by one Gauss-Newton step for H and Q. If the FRFs show M well, it stays nearly unchanged.
     """
     h, q = (np.array(x, np.complex128, order="C") for x in (on.h, on.q))
     line_info = np.empty(len(r), np.int32)

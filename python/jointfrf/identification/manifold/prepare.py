@@ -1,4 +1,4 @@
-"""What `identify` is given for a compliance fit, checked and put into a problem."""
+"""Checked arguments of `identify` for a compliance fit, as a problem."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ __all__ = [
     "shown_percent",
 ]
 
-#: FRFs that differ less than this from their transpose were made reciprocal.
+#: Relative difference of FRFs from their transpose below which they were made reciprocal.
 _RECIPROCAL = 1e-9
 
 
@@ -57,7 +57,7 @@ class FitOptions:
     position_error: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the words."""
+        """Check the choices."""
         if isinstance(self.damping, str):
             check_choice("damping", self.damping, (*get_args(DampingTerms), "auto"))
         else:
@@ -70,37 +70,40 @@ class FitOptions:
 
 @dataclass(frozen=True)
 class FitProblem:
-    """A fit on the manifold, ready to be computed: lines inside the bands only.
+    """A fit on the manifold, ready to be computed, on the lines inside the bands.
 
     Attributes
     ----------
     dofs : tuple of str
         Names of the n joint DOFs.
     freq_hz : ndarray, shape (n_freq,)
+        Frequencies, Hz.
     frfs : InterfaceFrfs
-        Measured and smooth FRFs, their variance, and the way to the joint DOFs.
+        Measured and smooth FRFs, their variance, and their conversion to the joint DOFs.
     noise : KnownNoise
+        Noise of the FRFs.
     used : ndarray of bool, shape (n_freq, n)
         Lines used for each DOF.
     bands : tuple
-        For each DOF its bands, (low, high) in Hz.
+        Bands of each DOF, (low, high) in Hz.
     options : FitOptions
+        Choices of the fit.
     near : tuple of GroupStart
-        Of other FRFs of the same structure: where the fit starts first.
+        First initial values, from other FRFs of the same structure.
     deformation : ndarray, shape (n_freq, m_r, m_f), optional
-        Part of the variance that is not noise: squares of what is not rigid in the channels, (m/N)^2.
+        Part of the variance by non-rigid motion of the channels, (m/N)^2.
     bending : SideBending, optional
-        How much the sides bend among the channels, where these show it and no models correct them.
+        Deformation of the sides among the channels, if these show it and no models correct it.
     added_compliance : ndarray, shape (n,), optional
-        What the sides add to the compliance of each joint DOF where that was said, m/N or rad/(N m).
+        Stated compliance that the sides add to each joint DOF, m/N or rad/(N m).
     model_errors : tuple of str, optional
-        What of the models of the sides may be off, where models correct the FRFs.
+        Names of errors of the models of the sides, if models correct the FRFs.
     left_out : tuple of LeftOutDof
-        DOFs that are not sought, but whose motion the channels take for one that is.
+        Omitted DOFs whose motion the channels attribute to a joint DOF.
     motion : ndarray, shape (n_freq,), optional
         Size of the motion on each line, if the FRFs depend on amplitude.
     position_errors : tuple of ndarray, shapes (n_errors, 2 n, 2 n), optional
-        Joint DOFs that errors of the positions mix, as `Transforms.position_errors`.
+        Joint DOFs that errors of the positions mix, see `Transforms.position_errors`.
     """
 
     dofs: tuple[str, ...]
@@ -121,7 +124,7 @@ class FitProblem:
 
     @property
     def sides_bend(self) -> bool:
-        """Whether the sides may bend between channels and joint."""
+        """Whether the sides may be flexible between channels and joint."""
         return self.bending is not None or self.model_errors is not None
 
     def with_noise(self, scale: float) -> FitProblem:
@@ -133,7 +136,7 @@ class FitProblem:
 
 
 def as_equal_points(same: Sequence[str] | Sequence[Sequence[str]] | None) -> tuple[tuple[str, ...], ...]:
-    """Return lists of points whose joints are equal, as `identify` takes them: one list of names, or several."""
+    """Return lists of points with equal joints, from the argument `same` of `identify`: one list, or several."""
     if same is None:
         return ()
     if isinstance(same, Sequence) and not isinstance(same, str) and all(isinstance(one, str) for one in same):
@@ -170,10 +173,11 @@ def prepare_compliance(
     is_checked: bool = False,
     is_reciprocal: bool = True,
 ) -> FitProblem:
-    """Check the arguments of the fit, find the noise, and keep the lines in the bands; as in `identify`.
+    """Check the arguments of the fit, estimate the noise, and keep the lines in the bands; see `identify`.
 
-    `is_checked` says that the channels show the joint DOFs: those of other noise on the same FRFs did. `is_reciprocal`
-    says that of FRFs without errors h_pq = h_qp, which those of joints that depend on amplitude are not.
+    `is_checked` states that the channels show the joint DOFs, because other realisations of the same FRFs did.
+    `is_reciprocal` states that FRFs without errors have h_pq = h_qp, which is not true if the joint depends on
+    amplitude.
     """
     freq, h = measured.freq_hz, measured.h
     transforms = as_transforms(transform, h)
@@ -183,14 +187,14 @@ def prepare_compliance(
     names = as_dof_names(dofs, responses.shape[0] // 2)
     _check_points(options, names)
     if not isinstance(options.damping, str) and len(options.damping) != len(names):
-        raise ValueError(f"damping must hold one word for each of {len(names)} DOFs, not {len(options.damping)}")
+        raise ValueError(f"damping must have one word for each of {len(names)} DOFs, not {len(options.damping)}")
     own = as_bands(bands, names, freq)
     used = np.stack([in_bands(freq, b) for b in own], axis=1)
     kept = np.asarray(used.any(axis=1))
     if not kept.all():  # no copy of long sweeps otherwise
         freq, h = freq[kept], h[kept]
     noise = noise.on_lines(kept, measured.h.shape)
-    # Whether channels are the same points is known where both transforms are one.
+    # Channels are known to be the same points if both transforms are one.
     square = h.shape[1] == h.shape[2] and np.array_equal(responses, forces)
     is_square = options.reciprocal and square
     if not is_checked:
@@ -263,9 +267,8 @@ def _without_errors(
 ) -> tuple[ComplexArray, SmoothedFrfs]:
     """Return FRFs without the mass of a sensor and shares of other DOFs in the channels, and their noise.
 
-    FRFs that differ from their transpose are smooth only without the shares. The mean of both directions shows the
-    shares first, whose noise is in their differences as well, and then smooth FRFs. Without `has_shares` none are
-    sought.
+    FRFs that differ from their transpose are smooth only without the shares. The mean of both directions first shows
+    the shares, whose noise is also in their differences, and then smooth FRFs. Without `has_shares` none are estimated.
     """
     rotations = np.array([is_rotation(name) for name in names])
     # Without a transform the channels are the joint DOFs.
@@ -286,7 +289,7 @@ def _without_errors(
     mean /= 2
     first = off_axis(mean)
     if first is None:
-        del mean  # of a long sweep as large as all that the fit keeps
+        del mean  # for a long sweep it is as large as all arrays that the fit keeps
         return with_noise(None, h)
     found = with_noise(first, mean)
     return with_noise(off_axis(found[1].smooth), found[1].smooth)
@@ -315,25 +318,25 @@ def _check_joint_dofs(transforms: Transforms, h: ComplexArray, names: tuple[str,
 
 
 def _is_symmetrised(h: ComplexArray) -> bool:
-    """Whether FRFs were made reciprocal: both directions are then one measurement, with one noise."""
-    # Mostly the first line shows that they were not.
+    """Return whether FRFs were made reciprocal: both directions are then one measurement, with one noise."""
+    # Usually the first line shows that they were not.
     return all(
         bool((abs(part - part.swapaxes(1, 2)) <= _RECIPROCAL * abs(part)).all())
         for part in (h[own] for own in (slice(1), *line_slices(len(h))))
     )
 
 
-#: Rows whose normalised products leave an eigenvalue below this are the same to rounding, or a sum of others.
+#: Eigenvalue of the normalised products of rows below which the rows are equal to rounding, or linearly dependent.
 _DEPENDENT = 1e-13
-#: Lines that are looked at for that, evenly spread.
+#: Number of evenly spaced lines of this check.
 _MOST_LINES = 500
-#: Rows of a transform that are a sum of others to this share.
+#: Relative residual below which a row of a transform is a sum of other rows.
 _RANK = 1e-9
-#: Noise of driving points from this share of them on hides what they are.
+#: Relative noise of driving points above which they cannot be recognised.
 _HIDDEN = 1.0
-#: FRFs that are above their noise on so small a share of lines are not seen.
+#: Share of lines with FRFs above their noise below which there is no signal.
 _SEEN = 0.02
-#: A residual of this share of the FRFs, and so many times the noise, is that of no joint.
+#: Residual, relative to the FRFs and to the noise, above which no joint fits.
 _NO_FIT, _FAR = 0.5, 2.0
 _TINY = float(np.finfo(float).tiny)
 
@@ -350,9 +353,9 @@ def check_transform(name: str, transform: FloatArray, labels: list[str]) -> None
 
 
 def check_channels(gamma: ComplexArray, labels: list[str]) -> None:
-    """Raise an error for measured FRFs between joint DOFs j, then k, that hold no signal, or one DOF twice.
+    """Raise an error for measured FRFs between joint DOFs j, then k, without a signal, or with one DOF twice.
 
-    On the two sides of a rigid joint calculated FRFs are the same; measured ones differ by their noise.
+    On both sides of a rigid joint calculated FRFs are equal; measured ones differ by their noise.
     """
     half = len(labels) // 2
     some = gamma[:: -(-len(gamma) // _MOST_LINES)]
@@ -382,10 +385,10 @@ def check_channels(gamma: ComplexArray, labels: list[str]) -> None:
 
 
 def _products(h: ComplexArray, squares: FloatArray) -> ComplexArray:
-    """Return products of rows of norm 1, shape (rows, rows), to which every line and column adds alike."""
+    """Return products of rows of norm 1, shape (rows, rows), with equal weight for every line and column."""
     of_columns = np.maximum(np.sqrt(squares.mean(axis=(0, 1))), _TINY)
     of_lines = np.maximum(np.sqrt((squares / of_columns / of_columns).mean(axis=(1, 2), keepdims=True)), _TINY)
-    # A divisor below the smallest normal number has no finite inverse: what is dead stays 0.
+    # A divisor below the smallest normal number has no finite inverse: dead rows stay 0.
     flat = (h / np.maximum(of_columns * of_lines, _TINY)).swapaxes(0, 1).reshape(h.shape[1], -1)
     product: ComplexArray = flat @ flat.conj().T
     size = np.sqrt(product.diagonal().real)
@@ -393,7 +396,7 @@ def _products(h: ComplexArray, squares: FloatArray) -> ComplexArray:
 
 
 def _is_measured(gamma: ComplexArray) -> bool:
-    """Whether there is noise between h_pq and h_qp."""
+    """Return whether there is noise between h_pq and h_qp."""
     return bool(abs(gamma - gamma.swapaxes(1, 2)).max() > 1e-9 * abs(gamma).max())
 
 
@@ -403,10 +406,11 @@ def check_joint_seen(freq: FloatArray, smooth: ComplexArray, variance: FloatArra
     Parameters
     ----------
     freq : ndarray, shape (n_freq,)
+        Frequencies, Hz.
     smooth : ndarray, shape (n_freq, 2 n, 2 n)
-        Smooth FRFs between joint DOFs j, then k.
+        Smooth FRFs between joint DOFs j, then k, m/N.
     variance : ndarray, shape (n_freq, 2 n, 2 n)
-        E|e|^2 of the measured ones.
+        Noise variance E|e|^2 of the measured FRFs, (m/N)^2.
     """
     span = f"{freq.min():g} to {freq.max():g} Hz"
     some = spread_lines(len(freq))
@@ -440,12 +444,13 @@ def check_estimate(found: JointEstimate, level: float, span: str, *, is_level_kn
     Parameters
     ----------
     found : JointEstimate
+        Result of the fit.
     level : float
         Noise relative to the FRFs.
     span : str
-        The lines, in words.
+        Frequency range as text.
     is_level_known : bool
-        Whether that is known from elsewhere than from the residual.
+        Whether the noise level has another source than the residual.
     """
     for group in found.groups:
         equations, unknowns = 2 * group.equations, group.x.size
@@ -470,5 +475,5 @@ def check_estimate(found: JointEstimate, level: float, span: str, *, is_level_kn
 
 
 def shown_percent(share: float) -> str:
-    """Return a share in percent, in words where it is far above 1."""
+    """Return a share in percent, in words if it is far above 1."""
     return f"{100 * share:.0f} %" if share < 10 else "far more than 100 %"

@@ -1,4 +1,4 @@
-"""First coordinates of a joint from the compliance of smooth FRFs."""
+"""Initial coordinates of a joint from the compliance of smooth FRFs."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from jointfrf.substructuring.compliance import compliance_covariance, joint_comp
 
 __all__ = ["first_joints", "hidden_share"]
 
-#: Smooth FRFs have about this share of the noise.
+#: Approximate error of smooth FRFs, as a share of the noise.
 _SMOOTH = 0.2
-#: Lines whose covariance of all entries of C is there at once: n^4 numbers a line.
+#: Number of lines whose covariance of all entries of C is in memory at once: n^4 numbers a line.
 _PIECE = 1024
-#: Squares of a start are minimised to this.
+#: Tolerance of the squares of an initial value.
 _ROUGH = 0.1
-#: Of many lines about so many, evenly spread, give the starts, and show which is better.
+#: Number of evenly spaced lines that give the initial values and compare them.
 _SOME_LINES = 150
-#: Lines count less from this relative noise of gamma_jk on.
+#: Relative noise of gamma_jk above which lines get less weight.
 _HIDDEN = 0.1
 
 
 def first_joints(data: LineData, joint: SpringJoint) -> list[FloatArray]:
-    """Return coordinates of the joint from the compliance of the smooth FRFs, the likeliest first.
+    """Return coordinates of the joint from the compliance of the smooth FRFs, the most probable first.
 
-    C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj of the smooth FRFs on every line, with the covariance that a share of
-    the noise gives it, and from it R = (1 + C Z)^-1 C; lines on which noise hides gamma_jk count little.
+    The compliance is C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj of the smooth FRFs on every line, with the covariance
+    by a share of the noise. From it follows R = (1 + C Z)^-1 C. Lines whose noise exceeds gamma_jk have little weight.
     """
     n = data.entries.n
     a = range(n)
@@ -66,7 +66,7 @@ def first_joints(data: LineData, joint: SpringJoint) -> list[FloatArray]:
 def _with_springs(
     compliance: ComplexArray, covariance: ComplexArray, springs: FloatArray
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Return R = (1 + C Z)^-1 C and its covariance from those of C: dR = (1 + C Z)^-1 dC (1 + Z C)^-1."""
+    """Return R = (1 + C Z)^-1 C and its covariance from C and its covariance: dR = (1 + C Z)^-1 dC (1 + Z C)^-1."""
     n = compliance.shape[-1]
     left = invert(np.eye(n) + compliance * springs, on_singular="nan")
     right = invert(np.eye(n) + springs[:, None] * compliance, on_singular="nan")
@@ -75,7 +75,7 @@ def _with_springs(
 
 
 def _variance(data: LineData) -> FloatArray:
-    """Return the variance of the entries, 0 where one is not used, shape (n_freq, q)."""
+    """Return the variance of the entries, 0 if one is not used, shape (n_freq, q)."""
     w = data.inverse_std
     return np.where(w > 0, 1 / np.where(w > 0, w, 1) ** 2, 0)
 
@@ -102,7 +102,7 @@ def _hidden(gamma: ComplexArray, spread: FloatArray) -> FloatArray:
 
 
 def _diagonal_starts(data: LineData, joint: DiagonalJoint) -> list[FloatArray]:
-    """Return the starts of a joint without cross terms from the kernel: least squares of R, and its mean undamped."""
+    """Return initial values of a joint without cross terms from the kernel: least squares of R, and its mean."""
     entries, p = data.entries, joint.lower.size
     found = np.empty((2, p))
     # Packed: entries as a column of each line.
@@ -116,7 +116,7 @@ def _diagonal_starts(data: LineData, joint: DiagonalJoint) -> list[FloatArray]:
 def _coupled_starts(
     value: ComplexArray, covariance: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: SpringJoint
 ) -> list[FloatArray]:
-    """Fit all entries of R; first values from K* R = 1 - Z R by linear least squares, and from the mean of R."""
+    """Fit all entries of R; initial values from K* R = 1 - Z R by linear least squares, and from the mean of R."""
     n = joint.n
     a, b = joint.rows, joint.columns
     size = np.sqrt(np.maximum(np.einsum("lqq->lq", covariance).real, np.finfo(float).tiny))
@@ -135,7 +135,7 @@ def _coupled_starts(
     linear = _linear_start(value[some], own[some], line_weight[some], few)
     starts = [start for start in (linear, _mean_start(value, own, line_weight, joint)) if np.isfinite(start).all()]
     minima = sorted((few.minimise(of_few, start, least_gain=_ROUGH) for start in starts), key=lambda one: one.cost)
-    if len(minima) > 1 and minima[1].cost < minima[0].cost + _ROUGH:  # one place, found twice
+    if len(minima) > 1 and minima[1].cost < minima[0].cost + _ROUGH:  # the same minimum twice
         del minima[1]
     found = [one.x for one in minima]
     if some.step > 1 and found:

@@ -1,4 +1,4 @@
-"""From channels to joint DOFs, and what in the channels is not rigid motion."""
+"""From channels to joint DOFs, and non-rigid motion of the channels."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = [
     "modes_of",
 ]
 
-#: What a transform may be given as.
+#: Types that the argument `transform` accepts.
 Transform = ArrayLike | Interface
 
 
@@ -31,12 +31,13 @@ class Transforms(NamedTuple):
     Attributes
     ----------
     responses, forces : ndarray, shapes (2 n, m_r), (2 n, m_f)
+        Matrices from channels to joint DOFs j, then k.
     response_modes, force_modes : ndarray, shapes (m_r, 2 n), (m_f, 2 n), or None
-        Rigid motion of the channels, where it is known.
+        Rigid motion of the channels, if known.
     geometry, force_geometry : Interface or None
-        Geometry of the responses and of the forces, if it is known.
+        Geometry of the responses and of the forces, if known.
     compliance : ndarray, shape (n,), or None
-        What the sides add to the compliance of the joint DOFs, where that was said.
+        Stated compliance that the sides add to the joint DOFs, m/N or rad/(N m).
     """
 
     responses: FloatArray
@@ -60,11 +61,11 @@ class Transforms(NamedTuple):
         return h if self.are_units else self.responses @ h @ self.forces.T
 
     def variance(self, variance: FloatArray) -> FloatArray:
-        """Return their variance where that of the channels is independent, (m/N)^2."""
+        """Return the variance of these FRFs for independent noise of the channels, (m/N)^2."""
         return variance if self.are_units else self.responses**2 @ variance @ (self.forces**2).T
 
     def with_modes(self, smooth: ComplexArray) -> Transforms:
-        """Return the same with the rigid modes of plain matrices, as far as smooth FRFs bear them out."""
+        """Return the same with the rigid modes of plain matrices, if smooth FRFs confirm them."""
         if self.are_units:
             return self
         responses, forces = self.response_modes, self.force_modes
@@ -77,9 +78,9 @@ class Transforms(NamedTuple):
     def position_errors(self, size: float) -> tuple[FloatArray, FloatArray] | None:
         """Return the joint DOFs that errors of positions mix, of responses and of forces, shapes (n_errors, 2 n, 2 n).
 
-        Each channel is off its stated place by `size`, m, along one axis. Channels that are both responses and forces
-        are points of the structure: one error moves the sensor and the impact. None if the positions are not known, or
-        if no joint DOF depends on them.
+        Each channel is displaced from its stated position by `size`, m, along one axis. Channels that are both
+        responses and forces are points of the structure: one error moves the sensor and the impact. None if the
+        positions are not known, or if no joint DOF depends on them.
         """
         if self.geometry is None or self.force_geometry is None:
             return None
@@ -95,7 +96,7 @@ class Transforms(NamedTuple):
 
     @property
     def channels(self) -> tuple[ChannelModes, ChannelModes] | None:
-        """Rigid motion of responses and of forces, where both are known."""
+        """Rigid motion of responses and of forces, if both are known."""
         if self.response_modes is None or self.force_modes is None:
             return None
         return ChannelModes(self.responses, self.response_modes), ChannelModes(self.forces, self.force_modes)
@@ -140,9 +141,9 @@ def as_transforms(transform: Transform | tuple[Transform, Transform] | None, h: 
     )
 
 
-#: A channel is checked by the others when at least this share of its error stays in its residual.
+#: Least share of an error that stays in the residual of a channel which the other channels check.
 _CHECKED = 0.02
-#: Modes found from a matrix alone hold where rigid motion is at least this share of the motion of the channels.
+#: Least share of rigid motion in the motion of the channels for modes that follow from a matrix alone.
 _RIGID = 0.9
 
 
@@ -152,7 +153,7 @@ class ChannelModes(NamedTuple):
     Attributes
     ----------
     transform : ndarray, shape (2 n, m)
-        From channels to joint DOFs j, then k.
+        Matrix from channels to joint DOFs j, then k.
     modes : ndarray, shape (m, 2 n)
         Motion of each channel for a unit of each joint DOF; transform times modes is the unit matrix.
     """
@@ -162,28 +163,29 @@ class ChannelModes(NamedTuple):
 
     @property
     def residual(self) -> FloatArray:
-        """From the channels to what is not rigid in them, shape (m, m)."""
+        """Matrix from the channels to their non-rigid motion, shape (m, m)."""
         left: FloatArray = np.eye(len(self.modes)) - self.modes @ self.transform
         return left
 
     @property
     def redundancy(self) -> FloatArray:
-        """Share of an error in each channel that stays in its residual, shape (m,); 0 below what can be used."""
+        """Share of an error in each channel that stays in its residual, shape (m,); 0 below the usable value."""
         own = np.diagonal(self.residual)
         share: FloatArray = np.where(own > _CHECKED, own, 0.0)
         return share
 
     def of_side(self, side: int) -> NDArray[np.intp]:
-        """Return the channels that the DOFs of side 0 (j) or 1 (k) are made of."""
+        """Return the channels of the DOFs of side 0 (j) or 1 (k)."""
         n = len(self.transform) // 2
         return np.flatnonzero(self.transform[side * n : (side + 1) * n].any(axis=0))
 
 
 def deformation_variance(smooth: ComplexArray, responses: ChannelModes, forces: ChannelModes) -> FloatArray:
-    """Squares of what is not rigid in smooth FRFs of the channels, shape (n_freq, m_r, m_f), (m/N)^2.
+    """Return squares of the non-rigid motion in smooth FRFs of the channels, shape (n_freq, m_r, m_f), (m/N)^2.
 
-    Of responses and of forces, each divided by the redundancy of its channel, so that the mean is that of the errors
-    themselves; the mean over a line and its neighbours. A channel that the others do not check has none.
+    Squares of responses and of forces are divided by the redundancy of their channel, so that the mean equals the mean
+    of the errors themselves. They are averaged over a line and its neighbours. A channel that no other channel checks
+    has none.
     """
     total = np.zeros(smooth.shape)
     for residual, share in (
@@ -195,13 +197,14 @@ def deformation_variance(smooth: ComplexArray, responses: ChannelModes, forces: 
 
 
 def modes_of(transform: FloatArray, smooth: ComplexArray) -> FloatArray | None:
-    """Rigid modes behind a matrix: those of which it is the least-squares inverse, if the channels move like that.
+    """Return the rigid modes whose pseudo-inverse a matrix is, if the channels move accordingly; else None.
 
     Parameters
     ----------
     transform : ndarray, shape (2 n, m)
+        Matrix from channels to joint DOFs.
     smooth : ndarray, shape (n_freq, m, k)
-        FRFs of its channels.
+        FRFs of its channels, m/N.
     """
     if np.linalg.matrix_rank(transform) < len(transform):
         return None

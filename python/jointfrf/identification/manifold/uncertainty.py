@@ -42,11 +42,11 @@ __all__ = [
     "uncertainty_of_joint",
 ]
 
-#: Probability at which parts of the band disagree on a parameter, and how many must show it.
+#: Probability below which parts of the band disagree on a parameter, and number of parts that must determine it.
 _DISAGREE, _LEAST_PARTS = 1e-3, 3
-#: A part whose information has a larger condition does not show all parameters.
+#: Condition number of the information of a part above which it does not determine all parameters.
 _SINGULAR = 1e8
-#: Squares of profiles are minimised to this.
+#: Tolerance of the squares of profiles.
 _PRECISE = 1e-3
 
 
@@ -58,7 +58,7 @@ class GroupLinearised(Linearised):
     frfs: InterfaceFrfs | None = None
 
     def __post_init__(self) -> None:
-        """Take what the group knows."""
+        """Copy attributes of the group."""
         group, p = self.group, self.group.x.size
         slope = group.joint.theta_slope(group.x)
         # Noise is nearly normal in a compliance, and a rigid DOF has no finite slope.
@@ -143,13 +143,13 @@ class GroupLinearised(Linearised):
         errors = None if self.frfs is None else self.frfs.errors_of(group.dofs)
         if errors is not None and errors.shape[1]:
             own = [group.band_parts @ line.real for line, _ in self.changes(iter(errors.swapaxes(0, 1)), every)]
-            # Lines that are in no part of the band weigh nothing.
+            # Lines outside all parts of the band have no weight.
             found.append(Effect(np.array(own), 1.0))
         if compliance is not None:
             steps = 2 * _softer(group, compliance[group.dofs]) @ self.covariance
             of_compliance = group.joint.is_compliance
             if of_compliance.any():
-                # Whatever the damping takes up of it.
+                # Without the part that the damping absorbs.
                 own_step = np.diag(compliance[group.dofs])[:, of_compliance[: len(group.dofs)]]
                 steps[:, of_compliance] = own_step / group.joint.compliance_slope(group.x)[of_compliance]
             found.append(Effect((steps @ self.information)[:, None], 1.0))
@@ -157,7 +157,7 @@ class GroupLinearised(Linearised):
 
 
 def _softer(group: GroupFit, compliance: FloatArray) -> FloatArray:
-    """Return by how much the gradient changes when the compliance of each DOF is larger, shape (n, p)."""
+    """Return the change of the gradient for a larger compliance of each DOF, shape (n, p)."""
     joint, forms = group.joint, group.forms
     entries = joint.compliance(group.x)
     adjoint = joint.slope(group.x, entries).conj()
@@ -170,7 +170,7 @@ def _softer(group: GroupFit, compliance: FloatArray) -> FloatArray:
 
 
 class _GroupUncertainty(NamedTuple):
-    """Uncertainty of one group of DOFs: smooth errors are what channels and set-ups have, sides are not among them."""
+    """Uncertainty of one group of DOFs: smooth errors include channels and set-ups, but not sides."""
 
     at: GroupLinearised
     smooth: list[Effect]
@@ -226,10 +226,11 @@ def uncertainty_of_joint(
     Parameters
     ----------
     found : JointEstimate
+        Estimate of the joint.
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     inflation : float
-        By how much correlation between lines makes the variance of a mean larger, at least 1.
+        Factor by which correlation between lines increases the variance of a mean, at least 1.
     frfs : InterfaceFrfs, optional
         FRFs of the channels; needed for errors of these.
     errors : CalibrationErrors, optional
@@ -297,10 +298,11 @@ def joint_intervals(found: JointEstimate, factor: FloatArray, added: FloatArray 
     Parameters
     ----------
     found : JointEstimate
+        Estimate of the joint.
     factor : ndarray, shape (p,)
         Variance of each parameter over its variance for independent noise.
     added : ndarray, shape (p,), optional
-        Standard error of each parameter in addition to this; of the compliance if a compliance is its coordinate.
+        Additional standard error of each parameter; of the compliance if a compliance is its coordinate.
     """
     more = np.zeros_like(factor) if added is None else added
     place = {which: (group, i) for group in found.groups for i, which in enumerate(group.which.tolist())}
@@ -318,7 +320,7 @@ def joint_intervals(found: JointEstimate, factor: FloatArray, added: FloatArray 
         if group.joint.may_be_rigid(i) and not group.joint.is_stiffness[i]:
             stiffness = int(group.which[group.joint.dofs[i]])
             if not np.isfinite(limits(stiffness, probability)[1]):
-                # A rigid DOF shows no damping.
+                # A rigid DOF does not determine damping.
                 return -np.inf, np.inf
         return _widened(group, i, own, float(special.ndtri((1 + probability) / 2)) * float(more[which]))
 
@@ -347,7 +349,7 @@ def joint_intervals(found: JointEstimate, factor: FloatArray, added: FloatArray 
 def _with_kind(
     limits: tuple[float, float], kind: FormMinimum, name: str, factor: float, probability: float
 ) -> tuple[float, float]:
-    """Return limits of a parameter that hold those of a kind of damping, too; zero where this has no such term."""
+    """Return limits of a parameter that contain the limits of another kind of damping; zero without such a term."""
     names = kind.joint.names
     low, high = _limits(kind, names.index(name), factor, probability) if name in names else (0.0, 0.0)
     return min(limits[0], low), max(limits[1], high)
@@ -386,7 +388,7 @@ def _widened(group: GroupFit, i: int, limits: tuple[float, float], reach: float)
 
 
 def profile_interval(group: FormMinimum, i: int, factor: float, probability: float = 0.95) -> tuple[float, float]:
-    """Interval of one parameter of a group by profile likelihood.
+    """Return the interval of one parameter of a group by profile likelihood.
 
     Parameters
     ----------
@@ -395,18 +397,19 @@ def profile_interval(group: FormMinimum, i: int, factor: float, probability: flo
     i : int
         Number of the parameter in the group.
     factor : float
-        By how much the variance exceeds that from independent noise.
+        Ratio of the variance to the variance by independent noise.
     probability : float
+        Coverage probability, default 0.95.
 
     Returns
     -------
     low, high : float
-        In units of the parameter; inf where the data give no limit.
+        Limits in units of the parameter; inf if the data give no limit.
 
     Notes
     -----
-    The squares are the quadratic forms of the last linearisation. For springs
-    without cross terms, the coordinate held is the compliance a = 1/k >= 0, or the damping.
+    The squares are the quadratic forms of the last linearisation. For springs without cross terms, the fixed coordinate
+    is the compliance a = 1/k >= 0, or the damping.
     """
     joint = group.joint.of_profile(i)
     best = group if joint is group.joint else joint.lowest(group.forms, joint.coordinates(group.joint.theta(group.x)))
@@ -416,12 +419,12 @@ def profile_interval(group: FormMinimum, i: int, factor: float, probability: flo
     )  # fmt: skip
     if not (joint.may_be_rigid(i) and _may_be_rigid(group, int(joint.dofs[i]), factor, probability)):
         return profile.of(i, probability)
-    # A rigid DOF shows no damping.
+    # A rigid DOF does not determine damping.
     return (profile.limit(i, 1, probability), np.inf) if joint.is_stiffness[i] else (-np.inf, np.inf)
 
 
 def _may_be_rigid(group: FormMinimum, dof: int, factor: float, probability: float) -> bool:
-    """Whether the squares of a rigid DOF, which has none of its parameters, exceed their minimum by chance."""
+    """Return whether the squares of a rigid DOF, without its parameters, exceed their minimum only by chance."""
     start = group.x.copy()
     start[dof] = 0.0
     rigid = group.joint.lowest(group.forms, start, dof, _PRECISE)
@@ -437,16 +440,18 @@ def residual_test_of(
     Parameters
     ----------
     found : JointEstimate
+        Estimate of the joint.
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     inflation : float
-        By how much correlation between lines makes the variance of a mean larger.
+        Factor by which correlation between lines increases the variance of a mean.
     known : JointUncertainty
+        Uncertainty of the parameters.
 
     Notes
     -----
-    A mean square of N complex residuals has the standard deviation 1/sqrt(N), its root half of that; the noise level,
-    found from as many data, has the same. Parts of the band agree on a parameter if the squares of their
+    A mean square of N complex residuals has the standard deviation 1/sqrt(N), and its root half of this; a noise level
+    estimated from as many data has the same. Parts of the band agree on a parameter if the squares of their
     differences from the whole, over their variance, follow chi^2.
     """
     added = 1 + known.excess
@@ -465,7 +470,7 @@ def residual_test_of(
 
 
 def _ratio_of_all(found: JointEstimate) -> float:
-    """Return the residual over the noise with the lines left out, by their distance from what fits the joint."""
+    """Return the residual over the noise, including omitted lines by their distance from FRFs that fit the joint."""
     if all(group.used.all() for group in found.groups):
         return float("nan")
     squares = equations = 0.0
@@ -473,7 +478,7 @@ def _ratio_of_all(found: JointEstimate) -> float:
         out = ~group.used
         own = group.problem.equations()[out]
         apart = np.full(own.size, FAR * group.joint.n**2) if group.on is None else group.on.squares[out]
-        # The distance is that of the smooth FRFs, without their noise.
+        # The distance of the smooth FRFs, without their noise.
         known = np.isfinite(apart)
         squares += group.noise_squares + float(apart[known].sum() + own[known].sum())
         equations += group.equations + float(own[known].sum())
@@ -489,7 +494,7 @@ def _trends(known: _GroupUncertainty, freq_hz: FloatArray, inflation: float) -> 
     if lines.size < BLOCKS * (p + 2):
         return []
     whole = group.covariance
-    # In parameters, not in coordinates: where only k drifts, c/k does, and c does not.
+    # In parameters, not in coordinates: if only k drifts, c/k does, and c does not.
     theta, slope = group.joint.theta(group.x), group.joint.theta_slope(group.x)
     member = group.band_parts
     gradient, information = group.of_groups(member)
@@ -513,7 +518,7 @@ def _trends(known: _GroupUncertainty, freq_hz: FloatArray, inflation: float) -> 
     found = []
     for i, name in enumerate(group.joint.names):
         shown = np.isfinite(changes[:, i]) & (errors[:, i] > 0)
-        # A part that does not see the parameter says nothing about it.
+        # A part that does not determine the parameter is ignored.
         shown &= errors[:, i] < abs(theta[i])
         if np.count_nonzero(shown) < _LEAST_PARTS:
             continue

@@ -1,7 +1,7 @@
-"""The fit where cross terms of C are unknown: of the joint to the diagonal of C on every line.
+"""The fit with unknown cross terms of C: of the joint to the diagonal of C on every line.
 
-On a line the FRFs of a reciprocal structure hold n (2 n + 1) numbers; H, M and the cross terms of C take n (n + 1) and
-n (n - 1)/2 of them. What is left are n equations for the diagonal of C, and n (n - 1)/2 that say that C is symmetric.
+On a line a reciprocal structure has n (2 n + 1) FRFs; H, M and the cross terms of C take n (n + 1) and n (n - 1)/2 of
+them. Then n equations remain for the diagonal of C, and n (n - 1)/2 conditions for the symmetry of C.
 Both follow from C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj, linearised at the smooth FRFs.
 """
 
@@ -24,11 +24,11 @@ from jointfrf.kernel.linear_algebra import invert, solve
 
 __all__ = ["ComplianceLines", "compliance_lines", "fit_unknown_cross"]
 
-#: Lines that are done at once.
+#: Number of lines in one chunk.
 _PIECE = 256
-#: Relative standard deviation in place of that of an entry that is not used.
+#: Relative standard deviation of an entry that is not used.
 _UNUSED = 1e4
-#: Part of its variance that a condition keeps when all others are known.
+#: Least part of the variance of a condition that remains if all further conditions are known.
 _OWN_NOISE = 1e-10
 
 
@@ -38,15 +38,15 @@ class ComplianceLines(NamedTuple):
     Attributes
     ----------
     value : ndarray, shape (n_freq, n)
-        m/N.
+        Diagonal of C, m/N.
     covariance : ndarray, shape (n_freq, n, n)
-        E[e e^H] of its noise.
+        Covariance E[e e^H] of its noise, (m/N)^2.
     squares : ndarray, shape (n_freq,)
         Squares of the conditions that were used, in units of their noise.
     apart : ndarray, shape (n_freq, m)
-        The conditions: differences of elements of C that are the same where it is symmetric, m/N.
+        Conditions: differences of elements of C that are zero if it is symmetric, m/N.
     variance : ndarray, shape (n_freq, m)
-        Of their noise.
+        Noise variance of the conditions, (m/N)^2.
     """
 
     value: ComplexArray
@@ -62,18 +62,20 @@ def compliance_lines(data: LineData) -> tuple[ComplianceLines, ComplianceLines]:
     Parameters
     ----------
     data : LineData
+        FRFs with their weights.
 
     Returns
     -------
     symmetric, plain : ComplianceLines
-        If C is that of a joint: symmetric where the structure is reciprocal, else the same from gamma_jk and from
-        gamma_kj; and if each cross term is unknown for itself. NaN on a line where gamma_jk of the smooth FRFs is
-        singular.
+        Diagonal of C for a joint, and for independent cross terms. For a joint C is symmetric if the structure is
+        reciprocal; otherwise it is the same from gamma_jk and from gamma_kj. NaN on a line with a singular gamma_jk of
+        the smooth FRFs.
 
     Notes
     -----
-    Noise of C = C(S) + L (gamma - S) R with L = (gamma_kk gamma_jk^-1, -1), R = (1, -gamma_jk^-1 gamma_jj) of the
-    smooth FRFs S; by the best linear estimate where conditions are correlated with the diagonal.
+    The noise of C is C(S) + L (gamma - S) R of the smooth FRFs S, with L = (gamma_kk gamma_jk^-1, -1) and
+    R = (1, -gamma_jk^-1 gamma_jj). If conditions are correlated with the diagonal, the result is the best linear
+    estimate.
     """
 
     def of_lines(own: slice) -> tuple[NDArray[Any], ...]:
@@ -90,7 +92,7 @@ def _of_piece(data: LineData) -> tuple[ComplianceLines, ComplianceLines]:
     """Return both for some lines."""
     n, reciprocal = data.entries.n, data.entries.reciprocal
     value, slope = _linear(data)
-    # The second C is the transpose of the first where the structure is reciprocal.
+    # The second C is the transpose of the first if the structure is reciprocal.
     a, b = np.triu_indices(n, 1) if reciprocal else np.nonzero(~np.eye(n, dtype=bool))
     d = np.arange(n)
     diagonal, first = d * (n + 1), a * n + b
@@ -112,7 +114,7 @@ def _of_piece(data: LineData) -> tuple[ComplianceLines, ComplianceLines]:
 def _conditioned(
     value: ComplexArray, noise: ComplexArray, apart: ComplexArray, noise_apart: ComplexArray
 ) -> ComplianceLines:
-    """Return the best linear estimate of values, given others that are zero but for their noise."""
+    """Return the best linear estimate of values, given conditions that are zero except for their noise."""
     covariance = noise @ noise.conj().swapaxes(1, 2)
     size = np.linalg.norm(noise_apart, axis=2)
     if apart.shape[1] == 0:
@@ -131,7 +133,7 @@ def _conditioned(
 def _linear(data: LineData) -> tuple[ComplexArray, ComplexArray]:
     """Return C of the measured FRFs to first order, and its derivatives by their entries: all its entries.
 
-    Shapes (n_freq, n^2) and (n_freq, n^2, q); without reciprocity those of C from gamma_kj follow.
+    Shapes (n_freq, n^2) and (n_freq, n^2, q); without reciprocity the entries of C from gamma_kj follow.
     """
     n = data.entries.n
     gamma = data.entries.matrix(data.smooth)
@@ -139,7 +141,7 @@ def _linear(data: LineData) -> tuple[ComplexArray, ComplexArray]:
     value, slope = _compliance(gamma, change, data.entries)
     if data.entries.reciprocal:
         return value, slope
-    # With sides exchanged gamma_jk and gamma_kj are, and C is the same.
+    # Exchanging the sides exchanges gamma_jk and gamma_kj, and C is the same.
     turned = np.r_[n : 2 * n, 0:n]
     entries = data.entries._replace(rows=turned[data.entries.rows], columns=turned[data.entries.columns])
     other = _compliance(gamma[:, turned[:, None], turned], change[:, turned[:, None], turned], entries)
@@ -168,37 +170,38 @@ def _coloured(slope: ComplexArray, data: LineData) -> ComplexArray:
     slope = slope * std[:, None, :]
     if data.correlation is None:
         return slope
-    # Entries over their deviation are L^-1 times independent noise.
+    # Entries over their deviation are L^-1 multiplied by independent noise.
     for line, triangle in enumerate(data.correlation):
         slope[line] = solve_triangular(triangle, slope[line].T, trans="T", lower=True, check_finite=False).T
     return slope
 
 
-#: Lines count less from this relative noise of gamma_jk on.
+#: Relative noise of gamma_jk above which lines get less weight.
 _HIDDEN = 0.3
-#: A residual larger than this is not noise: C varies between lines, or is not symmetric.
+#: Residual above which C varies between lines, or is not symmetric.
 _MISFIT = 1.15
-#: A mean square differs from 1 at this many standard deviations.
+#: Number of standard deviations beyond which a mean square differs from 1.
 _SIGMA = 4.0
 #: Squares of the mean over lines, in units of its noise, above which it is not zero.
 _CERTAIN = 16.0
-#: Steps for the scatter between lines at most; they end when the coordinates move by less than this many standard
-#: errors.
+#: Maximum number of steps for the scatter between lines, and the change of the coordinates, in standard errors, at
+#: which they end.
 _STEPS, _SETTLED = 30, 0.02
-#: Halvings of the range of a variance.
+#: Number of halvings of the range of a variance.
 _HALVINGS = 50
 
 
 class _Lines(NamedTuple):
-    """The diagonal of C on all lines, with what weighs them.
+    """The diagonal of C on all lines, with weights.
 
     Attributes
     ----------
     of : ComplianceLines
+        Diagonal of C with its noise.
     known : ndarray of bool, shape (n_freq, n)
         DOFs inside their bands.
     weight : ndarray, shape (n_freq,)
-        Near 1; near 0 where noise hides gamma_jk.
+        Weight near 1, or near 0 if noise exceeds gamma_jk.
     """
 
     of: ComplianceLines
@@ -206,7 +209,7 @@ class _Lines(NamedTuple):
     weight: FloatArray
 
     def forms(self, variance: FloatArray) -> LineForms:
-        """Return the quadratic forms where C varies between lines by this variance, shape (n,), beyond its noise."""
+        """Return the quadratic forms if C varies between lines by this variance, shape (n,), beyond its noise."""
         n = self.known.shape[1]
         diagonal = np.arange(n)
         both = self.known[:, :, None] & self.known[:, None, :]
@@ -221,7 +224,7 @@ class _Lines(NamedTuple):
 
 
 class _Weighted(NamedTuple):
-    """The minimum, with the standard deviation between lines, m/N, that belongs to it."""
+    """The minimum, with the corresponding standard deviation between lines, m/N."""
 
     minimum: FormMinimum
     scatter: FloatArray | None
@@ -230,21 +233,21 @@ class _Weighted(NamedTuple):
 
 
 def fit_unknown_cross(problem: GroupProblem, starts: Iterable[FloatArray]) -> GroupFit:
-    """Fit the diagonal of C by weighted least squares; lines that vary by more than their noise count more alike.
+    """Fit the diagonal of C by weighted least squares; weights are more equal if lines vary by more than their noise.
 
     Parameters
     ----------
     problem : GroupProblem
-        Its joint has no cross terms, and all cross terms of C are unknown.
+        Problem of a joint without cross terms, and with all cross terms of C unknown.
     starts : iterable of ndarray, shape (p,)
-        Coordinates of the joint.
+        Initial coordinates of the joint.
 
     Notes
     -----
-    The symmetry of C is used unless the FRFs contradict it. Where the residual exceeds the noise, C is taken to vary
-    from line to line in excess of its noise, by as much as the median of the residuals shows: otherwise the lines of
-    least noise, often those of an antiresonance, would decide alone what the constant is. It is a mean of C_dd: where
-    no joint fits, it need not regenerate the FRFs.
+    The symmetry of C is used unless the FRFs contradict it. If the residual exceeds the noise, C varies from line to
+    line by the excess in the median of the residuals. Otherwise the lines of least noise, often lines of an
+    antiresonance, would determine the result alone. The result is a mean of C_dd: if no joint fits, it need not
+    regenerate the FRFs.
     """
     joint = problem.joint
     lines, is_symmetric = _lines(problem)
@@ -278,7 +281,7 @@ def _lines(problem: GroupProblem) -> tuple[_Lines, bool]:
 
 
 def _are_zero(found: ComplianceLines, weight: FloatArray) -> bool:
-    """Whether the conditions are zero but for noise, on lines and in their means over all lines."""
+    """Return whether the conditions are zero except for noise, on lines and in their means over all lines."""
     count = float(weight.sum()) * found.apart.shape[1]
     if count == 0:
         return True
@@ -295,7 +298,7 @@ def _mean_squares(found: ComplianceLines, weight: FloatArray) -> FloatArray:
 
 
 def _weight(hidden: FloatArray, found: ComplianceLines, least: int) -> FloatArray:
-    """Return weights of lines that fall off where noise hides gamma_jk; half the lines count where it does on most."""
+    """Return weights that are small if noise exceeds gamma_jk; half the lines count if it does on most lines."""
     good = np.isfinite(found.value).all(axis=1) & np.isfinite(found.covariance).all(axis=(1, 2))
     good &= np.isfinite(found.squares) & np.isfinite(hidden) & np.isfinite(found.variance).all(axis=1)
     if not good.any():
@@ -308,13 +311,13 @@ def _weight(hidden: FloatArray, found: ComplianceLines, least: int) -> FloatArra
 
 
 def _finite(found: ComplianceLines) -> ComplianceLines:
-    """Return the lines with numbers in those that are not finite: they weigh nothing."""
+    """Return the lines with finite numbers in place of others, which have no weight."""
     value, covariance, squares, apart = (np.where(np.isfinite(x), x, 0) for x in found[:4])
     return ComplianceLines(value, covariance, squares, apart, np.where(np.isfinite(found.variance), found.variance, 1))
 
 
 def _middle(lines: _Lines, joint: JointCoordinates) -> FloatArray:
-    """Return the stiffness of the median of C, no damping."""
+    """Return the stiffness of the median of C, without damping."""
     n = joint.n
     start = np.zeros(joint.lower.size)
     for d in range(n):
@@ -328,7 +331,7 @@ def _best_of(minima: list[FormMinimum]) -> FormMinimum:
 
 
 def _with_scatter(lines: _Lines, joint: JointCoordinates, start: FloatArray) -> _Weighted:
-    """Fit with the scatter between lines in their weights, and find it anew, until nothing moves."""
+    """Fit with the scatter between lines in their weights, and repeat with the new scatter until convergence."""
     x = start
     variance = _variance_between_lines(lines, joint, x)
     for step in range(1, _STEPS + 1):
@@ -338,7 +341,7 @@ def _with_scatter(lines: _Lines, joint: JointCoordinates, start: FloatArray) -> 
         converged = bool(np.sqrt(abs(2 * (change @ best.information @ change))) < _SETTLED * np.sqrt(x.size))
         if converged and step > 1:
             break
-        # The mean of both: alone, a scatter that is too large is followed by one that is too small.
+        # The mean of both, because the scatter alone would oscillate.
         variance = (variance + _variance_between_lines(lines, joint, x)) / 2
     return _Weighted(best, np.sqrt(variance), step, converged)
 
@@ -346,8 +349,8 @@ def _with_scatter(lines: _Lines, joint: JointCoordinates, start: FloatArray) -> 
 def _variance_between_lines(lines: _Lines, joint: JointCoordinates, x: FloatArray) -> FloatArray:
     """Return the variance of the diagonal of C between lines in excess of its noise, shape (n,).
 
-    With it the squares of the residual are those of noise in the median over lines, each by its weight: it takes no
-    account of lines that say little, nor of the size of the largest residuals.
+    With it the weighted median over lines of the squared residuals equals the median for noise. The median ignores the
+    size of the largest residuals, and lines with little information hardly count.
     """
     squares = abs(_residual(lines, joint, x)) ** 2
     noise = np.einsum("laa->la", lines.of.covariance).real
@@ -360,7 +363,7 @@ def _variance_between_lines(lines: _Lines, joint: JointCoordinates, x: FloatArra
 
 
 def _in_excess(squares: FloatArray, noise: FloatArray, weight: FloatArray) -> float:
-    """Return the variance in excess of that of the noise that explains the weighted median of squares."""
+    """Return the variance in excess of the noise that explains the weighted median of squares."""
     if squares.size == 0:
         return 0.0
     # Squares of circular noise are exponential: their median is ln 2 of their mean.
@@ -376,7 +379,7 @@ def _in_excess(squares: FloatArray, noise: FloatArray, weight: FloatArray) -> fl
 
 
 def _weighted_median(values: FloatArray, weight: FloatArray) -> float:
-    """Return the value below which half of the weight lies."""
+    """Return the value below which half of the weight is."""
     order = np.argsort(values)
     share = np.cumsum(weight[order])
     return float(values[order][np.searchsorted(share, share[-1] / 2)])

@@ -1,4 +1,4 @@
-"""An assembly of substructures, the joints between them or to the ground, and what is attached to it."""
+"""An assembly of substructures, joints between them or to the ground, attached masses and springs."""
 
 from __future__ import annotations
 
@@ -43,25 +43,25 @@ __all__ = [
     "places_of",
 ]
 
-#: Words that say what a parameter belongs to beside parts.
+#: Words that name the owner of a parameter in addition to parts.
 _WORDS = ("joint", "mean", "attachment", "response", "force")
 
 
 @dataclass(frozen=True)
 class Places:
-    """DOFs of the substructures that matter: joints, attachments, channels; part by part.
+    """DOFs of the substructures at joints, attachments and channels, part by part.
 
     Attributes
     ----------
     of : dict of str to tuple of str
-        By part; names without that of the part.
+        Names of the DOFs by part, without the name of the part.
     """
 
     of: dict[str, tuple[str, ...]]
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """All of them, ``"A/7:y"``."""
+        """All DOFs, ``"A/7:y"``."""
         return tuple(f"{part}/{dof}" for part, dofs in self.of.items() for dof in dofs)
 
     @cached_property
@@ -82,11 +82,11 @@ class JointPorts:
     dof : ndarray of int, shape (n,)
         Number of the joint DOF of each port.
     term : ndarray of int, shape (n,)
-        Which of the ports of this DOF it is.
+        Number of the port among the ports of this DOF.
     weight : ndarray, shape (n,)
         Factor of the values of the joint.
     ends : pair of tuple of str, length n
-        Its names on sides j and k; ``""`` is the ground.
+        Names on sides j and k; ``""`` is the ground.
     """
 
     dof: NDArray[np.intp]
@@ -102,7 +102,7 @@ class JointPorts:
     def columns(self, pattern: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Return, for each column of a connection of ports, the column of the DOFs and the term."""
         n = len(pattern) // 2
-        rows = abs(pattern).argmax(axis=0) % n  # of a law both sides, of a mass its own
+        rows = abs(pattern).argmax(axis=0) % n  # both sides of a law, one side of a mass
         terms = [np.arange((self.dof == row).sum()) for row in rows]
         return np.repeat(np.arange(rows.size), [own.size for own in terms]), np.concatenate(terms)
 
@@ -114,18 +114,22 @@ class PlacedJoint:
     Parameters
     ----------
     joint : LawJoint or Joint
-        Its laws; a `Joint` becomes springs and dampers. Its values are where a fit may start.
+        Laws of the joint with initial values; a `Joint` becomes springs and dampers.
     j, k : sequence of str
-        Its DOFs on either side, ``"frame/3:y"``, in its order; no `k` is the ground. ``"plate/edge:z"`` of a region
-        makes the values of the joint those per length or area.
+        DOFs on either side, ``"frame/3:y"``, in the order of the joint; no `k` is the ground, the default. With a
+        region, ``"plate/edge:z"``, the values of the joint are per length or area.
     weight : float
-        Factor of all its stiffness, damping and mass, such as the length that belongs to a node. Joints that are the
-        `same` have equal values and any weights.
+        Factor of all its stiffness, damping and mass, such as the length that belongs to a node; default 1. Joints that
+        are the `same` have equal values and any weights.
 
     Raises
     ------
     ValueError
         Another number or order of DOFs than the joint has; a weight that is not positive.
+
+    See Also
+    --------
+    Assembly.of_parts : assembly with placed joints.
 
     Examples
     --------
@@ -162,9 +166,9 @@ class Alike:
     Parameters
     ----------
     joints : sequence of str
-        Their names.
+        Names of the joints.
     spread : float, optional
-        Standard deviation of each parameter relative to its mean; by default the FRFs tell it.
+        Standard deviation of each parameter relative to its mean; by default it is estimated from the FRFs.
 
     Raises
     ------
@@ -192,32 +196,42 @@ class Alike:
 
 @dataclass(frozen=True, init=False)
 class Assembly:
-    """Substructures, joints between them or to the ground, and what is attached.
+    """Substructures, joints between them or to the ground, attached masses and springs.
 
-    DOFs of the assembly are named by their part, ``"A/7:y"`` and ``"B/1:y"`` of two; `of_parts` takes any number.
+    Names of DOFs begin with their part: ``"A/7:y"`` and ``"B/1:y"`` for two parts. `of_parts` takes more parts.
 
     Parameters
     ----------
     a, b : Substructure
-        Two of them, with the joint between their joint DOFs.
+        Two parts, with the joint between their joint DOFs.
     joint : LawJoint or Joint
-        Its laws; a `Joint` becomes springs and dampers. Its values are where a fit may start.
+        Laws of the joint with initial values; a `Joint` becomes springs and dampers.
     attachments : sequence of AddedMass or GroundSpring
+        Attached masses and springs to the ground; none by default.
 
     Attributes
     ----------
     parts : dict of str to Substructure
+        Parts by name.
     joints : dict of str to PlacedJoint
-        That of two parts is named ``""``.
+        Joints by name; the joint of two parts has the name ``""``.
     attachments : tuple of AddedMass or GroundSpring
+        Attached masses and springs.
     same : tuple of tuple of str
-        Joints that are equal, or parts whose unknowns are.
+        Groups of joints with equal parameters, or of parts with equal unknowns.
     alike : dict of str to Alike
+        Joints with common means.
 
     Raises
     ------
     ValueError
-        A number of joint DOFs that is not that of the joint; a DOF that does not exist.
+        A part with another number of joint DOFs than the joint; a DOF that does not exist.
+
+    See Also
+    --------
+    identify_model : fit of the joints and unknowns to measured FRFs.
+    Substructure : a part with its unknowns.
+    couple : FRFs of two parts and a joint, without unknowns.
 
     Examples
     --------
@@ -269,19 +283,20 @@ class Assembly:
         Parameters
         ----------
         parts : mapping of str to Substructure
-            By their names; the joint DOFs of these are not used.
+            Parts by name; their joint DOFs are not used.
         joints : mapping of str to PlacedJoint
-            By their names, which stand before those of their parameters: ``"mount.k_z"``.
+            Joints by name, which precedes the names of their parameters: ``"mount.k_z"``.
         attachments : sequence of AddedMass or GroundSpring
+            Attached masses and springs to the ground; none by default.
         same : sequence of sequence of str
-            Groups of joints that are equal, or of parts whose unknowns are: they have the parameters of the first one.
+            Groups of equal joints, or of parts with equal unknowns: they have the parameters of the first one.
         alike : mapping of str to Alike
             Joints with common means, which are named like parameters of a joint of this name.
 
         Raises
         ------
         ValueError
-            A name that there is not, or comes twice; joints of a group with other laws; a DOF that does not exist.
+            A name that does not exist, or comes twice; joints of a group with other laws; a DOF that does not exist.
 
         Examples
         --------
@@ -321,12 +336,12 @@ class Assembly:
         held = {dof.partition("/")[0] for own in found.ends for dof in own}
         for name in found.parts:
             if name not in held:
-                raise ValueError(f"no joint holds {name}")
+                raise ValueError(f"no joint has the part {name}; add a joint or remove it")
         found._check_groups()
         return found
 
     def _per_size(self, name: str, one: PlacedJoint) -> LawJoint:
-        """Return a joint with the units that its ends give it; raises an error where these do not fit together."""
+        """Return a joint with the units of its ends; raise an error if these do not match."""
         units: dict[str, str] = {}
         for place, dof in enumerate(one.joint.dofs):
             regions = []
@@ -354,7 +369,7 @@ class Assembly:
         return one.joint.with_units_per(units) if units else one.joint
 
     def region(self, name: str) -> Region | None:
-        """Return the region of which a DOF ``"plate/edge:z"`` is the motion; None of other DOFs."""
+        """Return the region whose motion a DOF ``"plate/edge:z"`` is; None for other DOFs."""
         part, _, dof = name.partition("/")
         return self.parts[part].region(dof) if part in self.parts else None
 
@@ -366,11 +381,11 @@ class Assembly:
             object.__setattr__(self, name, value)
         for one in self.attachments:
             if not isinstance(one, get_args(Attachment)):
-                raise TypeError(f"attachments must hold AddedMass and GroundSpring, not {type(one).__name__}")
+                raise TypeError(f"attachments must be AddedMass or GroundSpring, not {type(one).__name__}")
             self.check(one.places, "attachment")
 
     def _check_groups(self) -> None:
-        """Raise an error for groups of what there is not, or of joints of other laws."""
+        """Raise an error for groups with unknown names, or of joints with other laws."""
         grouped: list[str] = []
         for what, names in (
             *(("same", one) for one in self.same),
@@ -395,38 +410,38 @@ class Assembly:
                     raise ValueError(f"{what}: {name} has other parameters than {names[0]}")
         for name in self.alike:
             if not isinstance(name, str) or not name or name in self.joints or any(sign in name for sign in "./, "):
-                raise ValueError(f"alike: a group must have a name of its own, not {one_line(name)}")
+                raise ValueError(f"alike: a group needs a new name, not {one_line(name)}")
 
     @property
     def a(self) -> Substructure:
-        """The first of two parts; a ValueError of others."""
+        """First of two parts; a ValueError for another number of parts."""
         return self._of_two("A")
 
     @property
     def b(self) -> Substructure:
-        """The second of two parts; a ValueError of others."""
+        """Second of two parts; a ValueError for another number of parts."""
         return self._of_two("B")
 
     def _of_two(self, name: str) -> Substructure:
         if "" not in self.joints:
-            raise ValueError(f"the parts are {', '.join(self.parts)}: a, b and with_joint are those of two parts")
+            raise ValueError(f"the parts are {', '.join(self.parts)}; a, b and with_joint need exactly two parts")
         return self.parts[name]
 
     @cached_property
     def joint(self) -> LawJoint:
-        """The joint; of several all of them as one, with DOFs named ``"mount.y"``."""
+        """The joint, or all joints as one with DOFs named ``"mount.y"``."""
         own = {name: one.joint for name, one in self.joints.items()}
         return own[""] if "" in own else joined(own)
 
     @cached_property
     def ends(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """The DOFs of `joint` on either side; ``""`` on that of the ground."""
+        """DOFs of `joint` on either side; ``""`` for the ground."""
         j = tuple(dof for one in self.joints.values() for dof in one.j)
         return j, tuple(dof for one in self.joints.values() for dof in one.k or ("",) * len(one.j))
 
     @cached_property
     def ports(self) -> JointPorts:
-        """The ports of the joints: DOFs, and coefficients of the motion of regions."""
+        """Ports of the joints: DOFs, and coefficients of the motion of regions."""
         dofs, terms, weights, sides = list[int](), list[int](), list[float](), (list[str](), list[str]())
         number = 0
         for one in self.joints.values():
@@ -450,7 +465,7 @@ class Assembly:
         return Assembly(self.a, self.b, joint, self.attachments)
 
     def with_attachments(self, *more: Attachment) -> Assembly:
-        """Return the same assembly with more attached."""
+        """Return the same assembly with additional attachments."""
         found = copy(self)
         object.__setattr__(found, "attachments", (*self.attachments, *more))
         return found
@@ -472,7 +487,7 @@ class Assembly:
                 raise ValueError(f"{what} {one_line(name)}: {whose} has such a DOF (names begin with {begin})")
 
     def receptance(self, freq_hz: ArrayLike, responses: Sequence[str], forces: Sequence[str]) -> ComplexArray:
-        """Return the FRFs of the assembly as believed, shape (n_freq, n_responses, n_forces), m/N.
+        """Return the FRFs of the nominal assembly, shape (n_freq, n_responses, n_forces), m/N.
 
         Raises
         ------
@@ -505,21 +520,21 @@ class Assembly:
 
 
 def check_joint_order(where: str, dofs: Sequence[str], joint: Sequence[str]) -> None:
-    """Raise a ValueError where DOFs of a substructure stand in another order than those of the joint.
+    """Raise a ValueError if DOFs of a substructure are in another order than the DOFs of the joint.
 
     Parameters
     ----------
     where : str
         Beginning of the message.
     dofs : sequence of str
-        Joint DOFs of the substructure, ``"601:theta"``; without a direction the name says nothing.
+        Joint DOFs of the substructure, ``"601:theta"``; a name without a direction is not checked.
     joint : sequence of str
         DOFs of the joint, of any names.
 
     Notes
     -----
-    A rotation must be a rotation. A direction must not be that of another DOF of the joint; one that the joint does not
-    have may be the same motion in other axes.
+    A rotation must be a rotation. A direction must not be the direction of another DOF of the joint; a direction that
+    the joint does not have may be the same motion in other axes.
     """
     known = [_direction(dof) for dof in joint]
     for dof, own, name in zip(dofs, (_direction(dof.rpartition(":")[2]) for dof in dofs), joint, strict=True):
@@ -529,12 +544,12 @@ def check_joint_order(where: str, dofs: Sequence[str], joint: Sequence[str]) -> 
         is_other = own != meant and own in known and not _is_open(own, meant)
         if is_other or (meant and is_rotation(own) != is_rotation(meant)):
             raise ValueError(
-                f"{where}{dof} stands where the joint has {name}: its DOFs are, in this order, {', '.join(joint)}"
+                f"{where}{dof} is at the place of {name} of the joint; its DOFs are, in this order, {', '.join(joint)}"
             )
 
 
 def _direction(name: str) -> str:
-    """Return the name of a direction among `DIRECTIONS` where it is known, ``theta`` of a rotation without axis."""
+    """Return the name of a direction among `DIRECTIONS` if it is known, ``theta`` for a rotation without axis."""
     bare = name.lstrip("+-")
     try:
         return direction_names([bare])[0]
@@ -543,12 +558,12 @@ def _direction(name: str) -> str:
 
 
 def _is_open(own: str, meant: str) -> bool:
-    """Whether one of two names is a rotation without axis, and the other any rotation."""
+    """Return whether one of two names is a rotation without axis, and the other any rotation."""
     return "theta" in (own, meant) and is_rotation(own) and is_rotation(meant)
 
 
 def places_of(whole: Assembly, responses: Sequence[str], forces: Sequence[str]) -> Places:
-    """Return the DOFs that matter: those of joints first, each once."""
+    """Return the DOFs of joints, attachments and channels, joints first, each once."""
     named = [dof for own in whole.ports.ends for dof in own if dof]
     named += [*responses, *forces, *(dof for one in whole.attachments for dof in one.places)]
     of_part: dict[str, list[str]] = {name: [] for name in whole.parts}
@@ -561,23 +576,25 @@ def places_of(whole: Assembly, responses: Sequence[str], forces: Sequence[str]) 
 def assembly_connection(
     whole: Assembly, places: Places, omega: FloatArray, joint: LawJoint, numbers: Sequence[Sequence[float]]
 ) -> Connection:
-    """Return all that connects the substructures and holds or loads them: the joints first, then attachments.
+    """Return the connections of the substructures, with each other and to the ground: joints first, then attachments.
 
     Parameters
     ----------
     whole : Assembly
+        Assembly.
     places : Places
+        Its DOFs.
     omega : ndarray, shape (n_freq,)
-        rad/s.
+        Angular frequencies, rad/s.
     joint : LawJoint
-        That of the assembly with the values wanted.
+        Joint of the assembly with the values to use.
     numbers : sequence of sequence of float
-        Those of each attachment.
+        Numbers of each attachment.
 
     Returns
     -------
     Connection
-        Pattern of shape (m, q).
+        Connection with a pattern of shape (m, q).
     """
     own = joint_connection(whole, joint, omega)
     q = own.pattern.shape[1]
@@ -601,7 +618,7 @@ def assembly_connection(
 
 
 def joint_connection(whole: Assembly, joint: LawJoint, omega: FloatArray) -> Connection:
-    """Return how the joints connect the ports of an assembly: pattern of shape (2 n_ports, q), j, then k."""
+    """Return the connection of the ports of an assembly by its joints: pattern of shape (2 n_ports, q), j, then k."""
     own, ports = joint.connection(omega), whole.ports
     if ports.is_plain:
         return own
@@ -631,7 +648,7 @@ def connection_entries(
 
 
 def attachment_factors(one: Attachment, omega: FloatArray) -> ComplexArray:
-    """Return by what each number of an attachment enters its dynamic stiffness, shape (n_numbers, n_freq)."""
+    """Return the factor of each number of an attachment in its dynamic stiffness, shape (n_numbers, n_freq)."""
     if isinstance(one, AddedMass):
         return np.asarray([-(omega**2)], np.complex128)
     return np.asarray([np.ones_like(omega), 1j * omega], np.complex128)
@@ -639,14 +656,19 @@ def attachment_factors(one: Attachment, omega: FloatArray) -> ComplexArray:
 
 @dataclass(frozen=True)
 class AddedMass:
-    """Mass of a sensor or a shaker that the models do not have.
+    """Mass of a sensor or a shaker that is not in the models.
 
     Parameters
     ----------
     dofs : str or tuple of str
-        Where it moves, ``"A/151:y"``; all directions in which it does.
+        DOF of the mass, ``"A/151:y"``, or all its DOFs if it moves in several directions.
     mass : Unknown or float
-        kg (of a rotation kg m^2).
+        Mass, kg, or moment of inertia, kg m^2, for a rotation.
+
+    See Also
+    --------
+    GroundSpring : spring and dashpot to the ground.
+    Assembly : assembly with attachments.
 
     Examples
     --------
@@ -669,32 +691,37 @@ class AddedMass:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of its numbers."""
+        """Name of the mass."""
         return (f"mass {self.places[0]}",)
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Their units."""
+        """Unit of the mass."""
         return ("kg m^2" if is_rotation(self.places[0].rpartition(":")[2]) else "kg",)
 
     @property
     def numbers(self) -> tuple[Unknown | float, ...]:
-        """Its numbers: the mass."""
+        """Value of the mass."""
         return (self.mass,)
 
 
 @dataclass(frozen=True)
 class GroundSpring:
-    """Spring and dashpot to the ground: a suspension, a clamp that gives way, the stinger of a shaker.
+    """Spring and dashpot to the ground: a suspension, a flexible clamp, the stinger of a shaker.
 
     Parameters
     ----------
     dof : str
-        Where it holds, ``"A/1:theta"``.
+        DOF of the spring, ``"A/1:theta"``.
     stiffness : Unknown or float
-        N/m, of a rotation N m/rad.
+        Stiffness, N/m, or N m/rad for a rotation.
     damping : Unknown or float
-        Viscous, N s/m, N m s/rad.
+        Viscous damping, N s/m, or N m s/rad for a rotation; default 0.
+
+    See Also
+    --------
+    AddedMass : mass of a sensor or a shaker.
+    Assembly : assembly with attachments.
 
     Examples
     --------
@@ -717,18 +744,18 @@ class GroundSpring:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of its numbers."""
+        """Names of stiffness and damping."""
         return f"ground stiffness {self.dof}", f"ground damping {self.dof}"
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Their units."""
+        """Units of stiffness and damping."""
         turns = is_rotation(self.dof.rpartition(":")[2])
         return ("N m/rad", "N m s/rad") if turns else ("N/m", "N s/m")
 
     @property
     def numbers(self) -> tuple[Unknown | float, ...]:
-        """Its numbers: stiffness and damping."""
+        """Values of stiffness and damping."""
         return self.stiffness, self.damping
 
 

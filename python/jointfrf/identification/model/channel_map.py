@@ -1,4 +1,4 @@
-"""Channels that are not what they were named: signs and exchanges that the FRFs show beside models of the parts."""
+"""Search for wrong channel names: signs and exchanges that FRFs and models of the parts show."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from jointfrf.messages.finding import Finding
 __all__ = ["ChannelChange", "ChannelSearch", "find_channel_change"]
 
 NumbersT = TypeVar("NumbersT", ComplexArray, FloatArray)
-#: A change is made when it lowers -2 log likelihood by this and 2 ln of the number tried: odds of 1 to e^10 for each of
-#: those that were not made.
+#: Decrease of -2 log likelihood for a change, to which 2 ln of the number of trials is added: odds of 1 to e^10 for
+#: each rejected change.
 _CLEAR = 20.0
-#: It must remove this share of what the residual has above the noise: a change that only covers for models that are off
-#: removes less.
+#: Least share of the excess of the residual over the noise that a change must remove: a change that only compensates
+#: for wrong models removes less.
 _EXPLAINED = 0.8
-#: Linearisations with each change, and how many of the best are followed to their minimum.
+#: Number of linearisations with each change, and number of the best changes that are followed to their minimum.
 _GLANCE, _FOLLOWED = 6, 6
 
 
@@ -40,10 +40,13 @@ class ChannelChange:
     Attributes
     ----------
     kind : {"sign", "exchange"}
+        Kind of the change.
     side : {"response", "force"}
+        Side of the channels.
     channels : tuple of int
         One channel, or two that measure the same quantity.
     names : tuple of str
+        Names of the channels.
     """
 
     kind: Literal["sign", "exchange"]
@@ -52,7 +55,7 @@ class ChannelChange:
     names: tuple[str, ...]
 
     def of(self, frfs: NumbersT, *, signed: bool = True) -> NumbersT:
-        """Return FRFs with the change, shape (n_freq, n_o, n_i); their variances where `signed` is false."""
+        """Return FRFs with the change, shape (n_freq, n_o, n_i); their variances if `signed` is false."""
         found = frfs.copy()
         across = found if self.side == "response" else found.swapaxes(1, 2)
         if self.kind == "exchange":
@@ -85,9 +88,9 @@ class ChannelSearch(NamedTuple):
     Attributes
     ----------
     change : ChannelChange or None
-        The one that the FRFs show, alone.
+        The only change that the FRFs show.
     finding : Finding
-        What was found, in a sentence.
+        Result as a finding.
     """
 
     change: ChannelChange | None
@@ -100,7 +103,7 @@ def _changes(channels: Channels) -> Iterator[ChannelChange]:
         ("response", channels.responses), ("force", channels.forces),
     )  # fmt: skip
     for side, names in sides:
-        # One response by one force: the sign of one is that of the other.
+        # With one response and one force, a sign of one is a sign of the other.
         if side == "response" or max(len(channels.responses), len(channels.forces)) > 1:
             for i, name in enumerate(names):
                 yield ChannelChange("sign", side, (i,), (name,))
@@ -111,19 +114,20 @@ def _changes(channels: Channels) -> Iterator[ChannelChange]:
 
 
 def find_channel_change(problem: ModelProblem, channels: Channels) -> ChannelSearch:
-    """Look for one sign or one exchange of channels with which the models and a joint fit the FRFs far better.
+    """Search for one sign or one exchange of channels with which the models and a joint fit the FRFs far better.
 
     Parameters
     ----------
     problem : ModelProblem
-        With the channels as they were named.
+        Problem with the channels as named.
     channels : Channels
+        Names of the channels.
 
     Notes
     -----
-    The joint and all unknowns are fitted anew with each change, in a few steps, and with the best to the end.
-    -2 log likelihood is taken in units of the residual that the best leaves, so that models that are off do not count
-    as evidence. Two changes that fit alike, as those of a symmetric structure do, are both named, and none is made.
+    The joint and all unknowns are fitted again with each change, in a few steps, and completely with the best ones.
+    The unit of -2 log likelihood is the residual of the best one, so that wrong models do not count as evidence. If two
+    changes fit equally, as in a symmetric structure, both are named, and none is made.
     """
     changes = tuple(_changes(channels))
     with warnings.catch_warnings(), np.errstate(all="ignore"):
@@ -134,19 +138,19 @@ def find_channel_change(problem: ModelProblem, channels: Channels) -> ChannelSea
         for i in best:
             found[i] = minimise(_changed(problem, changes[i]).likelihood, found[i].x)
         first = min(best, key=lambda i: found[i].cost)
-        # The starts of a whole fit, where these have not led to the noise.
+        # The initial values of a complete fit, if these have not led to the noise.
         nearest = found[first] = min(
             found[first], lowest_minimum(_changed(problem, changes[first]), found[first])[0], key=lambda one: one.cost
         )
-        # A start from which the channels as they are named do not get to their minimum is no evidence against them.
+        # Initial values from which the channels as named do not reach their minimum are no evidence against them.
         given = min(given, minimise(problem.likelihood, nearest.x), key=lambda one: one.cost)
-    return _judged(problem, changes, given.cost, np.array([one.cost for one in found]))
+    return _significant_change(problem, changes, given.cost, np.array([one.cost for one in found]))
 
 
-def _judged(
+def _significant_change(
     problem: ModelProblem, changes: Sequence[ChannelChange], given: float, squares: FloatArray
 ) -> ChannelSearch:
-    """Return the change that least squares with the channels as given and with each change show, and a sentence."""
+    """Return the change that the least squares with each change show, and a sentence."""
     count = max(2.0 * np.count_nonzero(problem.likelihood.used) / problem.noise.inflation - problem.vector.free.size, 1)
     noise = 0.0 if problem.noise.is_assumed else 1.0
     best = float(squares.min())
@@ -177,7 +181,7 @@ def _named(changes: Sequence[ChannelChange]) -> tuple[str, ...]:
 
 
 def _changed(problem: ModelProblem, change: ChannelChange) -> ModelProblem:
-    """Return the problem with the change; variances of an exchanged channel go with it."""
+    """Return the problem with the change, including the variances of an exchanged channel."""
     return replace(
         problem,
         measured=change.of(problem.measured),
@@ -187,7 +191,7 @@ def _changed(problem: ModelProblem, change: ChannelChange) -> ModelProblem:
 
 
 def _least(problem: ModelProblem, starts: Sequence[FloatArray], steps: int = 40) -> Minimum:
-    """Return the lowest minimum from what single lines give, where all FRFs were measured, and from other starts."""
+    """Return the lowest minimum from the initial values of single lines, if possible, and from other initial values."""
     vector, prediction = problem.vector, problem.prediction
     found = list(starts)
     values = None

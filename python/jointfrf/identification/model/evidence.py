@@ -1,4 +1,4 @@
-"""Errors of models and gains, and how far joints that are alike scatter: by priors, or by the evidence of the FRFs."""
+"""Errors of models and gains, and the spread of similar joints: by priors, or by the evidence of the FRFs."""
 
 from __future__ import annotations
 
@@ -38,39 +38,39 @@ __all__ = [
 #: Standard deviation of the prior of a gain that all FRFs share: accelerometers and hammers are calibrated to 1 to 2 %
 #: (ISO 16063-21).
 GAIN = 0.01
-#: Terms of a part at most, and numbers that their derivatives may take: 400 MB.
+#: Maximum number of terms of a part, and of entries of their derivatives: 400 MB.
 _TERMS, _NUMBERS = 90, 25_000_000
-#: Where the search begins: models of one material and simple shape are as good.
+#: Initial value of the search: typical for models of one material and simple shape.
 _FIRST = 3e-3
-#: No entry of a modal matrix is off by more: it would not be positive definite.
+#: Largest relative error of an entry of a modal matrix: beyond it the matrix would not be positive definite.
 _LARGEST = 0.3
-#: Levels that are compared, in steps of a factor of 1.12; at the last one, where errors beyond the band are ninefold,
-#: the parts are not what the models describe, or something else is wrong.
+#: Levels that are compared, in steps of a factor of 1.12. At the last one, where errors beyond the band are ninefold,
+#: the models do not describe the parts, or another assumption is wrong.
 _LEVELS = np.geomspace(1e-6, _LARGEST / 9, 93)
 #: Levels of gains that are compared.
 _GAINS = np.geomspace(1e-6, _LARGEST, 112)
-#: Cycles over the kinds of errors at most, and the change of the logarithm of a level that counts as none.
+#: Maximum number of cycles over the kinds of errors, and tolerance of the logarithm of a level.
 _CYCLES, _SAME = 10, 0.05
-#: The level is found when it changes by less than this factor, or after so many fits.
+#: Tolerance of the level as a factor, and maximum number of fits.
 _SETTLED, _FITS = 1.15, 5
-#: Turns to the noise of models that are far off at most, and the factor between two turns that counts as none.
+#: Maximum number of updates of the noise for wrong models, and tolerance of an update as a factor.
 _DISCREPANCY_TURNS, _DISCREPANCY_SETTLED = 15, 1.02
-#: -2 log evidence must be lower by this much than without errors: less is chance.
+#: Least decrease of -2 log evidence by errors; a smaller one is chance.
 _LEAST_GAIN = 1.0
-#: The same for gains: by chance one of 400 fits shows one, as by half of chi-squared of one degree.
+#: Least decrease by gains: by chance one of 400 fits exceeds it, as half of chi-squared of one degree does.
 _LEAST_OF_GAINS = 7.9
-#: Levels whose -2 log evidence is higher by this are excluded: with 95 %, as by chi-squared of one degree.
+#: Increase of -2 log evidence that excludes a level: with 95 %, as by chi-squared of one degree.
 _EXCLUDED = 3.84
-#: What is believed of a spread relative to its mean: parts of one kind differ by some tens of percent at most.
+#: Prior of a spread relative to its mean: parts of one kind differ by some tens of percent at most.
 _USUAL_SPREAD = 0.3
-#: Spreads over which variances are averaged, relative to the mean: all that the prior and the likelihood leave.
+#: Spreads over which variances are averaged, relative to the mean: the whole range of prior and likelihood.
 _SPREADS = np.geomspace(1e-3, 3.0, 40)
-#: Steps to the spreads of a minimum at most, and the change from which on they have settled.
+#: Maximum number of steps to the spreads of a minimum, and their tolerance.
 _SPREAD_STEPS, _SPREAD_SETTLED = 500, 1e-3
 
 
 class ErrorLevel(NamedTuple):
-    """Standard deviation of errors of one kind, as the intervals allow for them.
+    """Standard deviation of errors of one kind that the intervals cover.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class ErrorLevel(NamedTuple):
     gain : float
         -2 log evidence without errors minus that with this level.
     largest : float
-        Largest level that the FRFs do not exclude: errors with a prior are allowed for up to this level.
+        Largest level that the FRFs do not exclude: intervals cover errors with a prior up to this level.
     """
 
     level: float
@@ -103,7 +103,7 @@ class Errors(NamedTuple):
     shapes : ErrorLevel
         Errors of mode shapes of the parts at channels that no joint touches.
     noise : float
-        Factor of the noise that covers what these errors leave (`with_discrepancy`).
+        Factor of the noise that covers the residual beyond these errors (`with_discrepancy`).
     """
 
     model: ErrorLevel
@@ -126,15 +126,17 @@ class ErrorGroup(NamedTuple):
     Attributes
     ----------
     origin : str
+        Kind of the errors, as in `FitParameter`.
     names : tuple of str
+        Name of each error.
     places : tuple of tuple
         Place of each error, as in `FitParameter`.
     weight, believed : ndarray, shape (n,)
-        Standard deviation of each error for a level of 1, and the level that its prior has.
+        Standard deviation of each error for a level of 1, and its prior level.
     levels : ndarray
-        Levels that are compared; the last one is no small error, and not allowed for.
+        Levels that are compared; the last one is rejected as no small error.
     least : float
-        -2 log evidence that a level must gain.
+        Least decrease of -2 log evidence.
     """
 
     origin: ErrorOrigin
@@ -159,12 +161,13 @@ class _Levels:
     Attributes
     ----------
     at : NormalEquations
-        About x, with the priors of `deviation`.
+        Squares about x, with the priors of `deviation`.
     x : ndarray, shape (p,)
+        Coordinates.
     groups : sequence of ErrorGroup
-        The last coordinates are their errors.
+        Groups of errors, which are the last coordinates.
     deviation : ndarray, shape (n_errors,)
-        Standard deviations of the priors, in whose units the coordinates are.
+        Standard deviations of the priors, which are the units of the coordinates.
     """
 
     at: NormalEquations
@@ -173,11 +176,11 @@ class _Levels:
     deviation: FloatArray
 
     def found(self, begin: Sequence[float]) -> list[ErrorLevel]:
-        """Return the level of each group that maximises the evidence, one after the other until they settle."""
+        """Return the level of each group that maximises the evidence, one after the other until convergence."""
         n, count = self.x.size - self.deviation.size, [one.weight.size for one in self.groups]
         ends = n + np.cumsum([0, *count])
         weight = np.concatenate([one.weight for one in self.groups])
-        # Without the priors of the errors, in units of the deviation for a level of 1, and about no errors.
+        # Without the priors of the errors, in units of the deviation for a level of 1, about zero errors.
         unit = np.concatenate([np.ones(n), weight / self.deviation])
         of_errors = np.zeros(self.x.size)
         of_errors[n:] = 1.0
@@ -227,26 +230,27 @@ def with_errors(
     is_sought: bool = True,
     at_most: float = np.inf,
 ) -> tuple[Likelihood, Minimum, Errors] | None:
-    """Fit with errors of models and gains as the FRFs show them, and as their priors allow; None if there are none.
+    """Fit with errors of models and gains from FRFs and priors; None if there are none.
 
     Parameters
     ----------
     likelihood : Likelihood
+        Objective without these errors.
     minimum : Minimum
-        Without these errors.
+        Its minimum.
     common_gain : float
         Standard deviation of the prior of a gain that all FRFs share.
     is_sought : bool
-        Whether errors of models that the FRFs show are allowed for if they have no prior.
+        Whether errors of models without a prior are included if the FRFs show them.
     at_most : float
         Level above which no fit is made: None if the squares about the minimum show a larger one.
 
     Notes
     -----
     Errors of one kind have one variance. It maximises the evidence, the likelihood integrated over all parameters and
-    errors, by Laplace's method at the minimum, which moves with it [1]_. The evidence shows no error that joint and
-    unknowns can mimic: a part has at least the level of its prior, as far as the evidence does not exclude it, and so
-    has the gain that all FRFs share. The largest level that is compared is no small error, and not allowed for.
+    errors, by Laplace's method at the minimum, which moves with it [1]_. Joint and unknowns can mimic some errors,
+    which the evidence therefore does not show. A part thus has at least its prior level unless the evidence excludes
+    it; the common gain of all FRFs, too. The largest level that is compared is rejected as no small error.
 
     References
     ----------
@@ -294,25 +298,26 @@ def with_errors(
 def with_discrepancy(
     likelihood: Likelihood, minimum: Minimum, inflation: float, ratio: float
 ) -> tuple[Likelihood, Minimum, Errors] | None:
-    """Fit models that are far off: with errors of modal matrices and mode shapes, and noise that covers the rest.
+    """Fit wrong models: with errors of modal matrices and mode shapes, and noise that covers the rest.
 
     None if no part has a model, or if such a fit does not converge.
 
     Parameters
     ----------
     likelihood : Likelihood
+        Objective without these errors.
     minimum : Minimum
-        Without these errors.
+        Its minimum.
     inflation : float
-        Lines that carry the noise of one independent line.
+        Number of lines that carry the noise of one independent line.
     ratio : float
-        Residual over noise at this minimum, where the noise begins.
+        Residual over noise at this minimum, which is the initial value of the noise.
 
     Notes
     -----
-    The mixed model y = f(x) + B u + e with a variance of its own for each kind of errors u, and one factor of the
-    variance of e. The factor falls from turn to turn to the mean square of the residual that the errors leave: FRFs
-    with much noise have one broad minimum, which the turns follow down.
+    The mixed model y = f(x) + B u + e with a separate variance for each kind of errors u, and one factor of the
+    variance of e. In each update the factor decreases to the mean square of the residual that the errors leave: FRFs
+    with much noise have one broad minimum, and the updates follow it to lower noise.
     """
     vector, n = likelihood.vector, minimum.x.size
     groups = _model_groups(likelihood.prediction, likelihood.measured.size, is_sought=True, of_shapes=True)
@@ -355,7 +360,7 @@ def _as_allowed(
     """Return levels without those that are not sought, or so large that the models do not describe the parts."""
     is_absurd = [one.level == group.levels[-1] for one, group in zip(levels, groups, strict=True)]
     if not is_first and any(at and one.origin == "error" for at, one in zip(is_absurd, groups, strict=True)):
-        return [one._replace(level=0.0) for one in levels]  # nor are gains seen with such models
+        return [one._replace(level=0.0) for one in levels]  # gains cannot be recognised with such models, either
     dropped = [
         not is_sought if one.origin == "error" else absurd for absurd, one in zip(is_absurd, groups, strict=True)
     ]
@@ -363,7 +368,7 @@ def _as_allowed(
 
 
 def _model_groups(prediction: Prediction, size: int, *, is_sought: bool, of_shapes: bool = False) -> list[ErrorGroup]:
-    """Return the errors of the models of all parts, if any is sought or has a prior; those of mode shapes last."""
+    """Return the errors of the models of all parts, if any is sought or has a prior; mode shapes last."""
     sides = prediction.sides
     if not (is_sought or any(side.part.error_level > 0 for side in sides)):
         return []
@@ -419,8 +424,9 @@ def error_terms(
     Parameters
     ----------
     prediction : Prediction
+        FRFs of the assembly.
     vector : ParameterVector
-        Without them.
+        Parameters without the errors.
     shape : (int, int)
         Numbers of responses and forces.
     common_gain : float
@@ -447,12 +453,13 @@ def expected_covariance(of_frfs: FloatArray, prior: FloatArray, groups: Sequence
     Returns
     -------
     ndarray, shape (p, p)
+        Covariance of the parameters.
 
     Notes
     -----
-    A fit allows for errors up to the level of their prior as far as the evidence does not exclude it (`with_errors`).
-    The expectation of -2 log evidence over the noise is log det I - tr(I^-1 J) + 2 e log(level), with the information
-    J of the FRFs and I = J + P of FRFs and priors.
+    A fit includes errors up to their prior level unless the evidence excludes it (`with_errors`). The expectation of
+    -2 log evidence over the noise is log det I - tr(I^-1 J) + 2 e log(level), with the information J of the FRFs and
+    I = J + P of FRFs and priors.
     """
     p = len(prior)
     ends = p + np.cumsum([0, *(one.weight.size for one in groups)])
@@ -490,13 +497,13 @@ def _expected_level(
 
 
 def with_spreads(likelihood: Likelihood, minimum: Minimum) -> tuple[Likelihood, Minimum]:
-    """Fit with the spreads of joints that are alike which the FRFs show, or which were given relative to the means.
+    """Fit with spreads of similar joints, estimated from the FRFs or given relative to the means.
 
     Notes
     -----
-    A spread s maximises the evidence, the means integrated, times s exp(-s / 30 %): this prior keeps it from zero where
-    few joints differ by no more than their errors [1]_, and from infinity where the FRFs hardly tell it. By the
-    algorithm of expectation and maximisation on the squares about the minimum, which moves with the spreads.
+    A spread s maximises the evidence, the means integrated, times s exp(-s / 30 %). This prior excludes zero if a few
+    joints differ by no more than their errors [1]_, and infinity if the FRFs hardly determine it. The method is
+    expectation-maximisation on the squares about the minimum, which moves with the spreads.
 
     References
     ----------
@@ -521,15 +528,15 @@ class _SharedPriors:
     Attributes
     ----------
     information, gradient : ndarray, shapes (p, p), (p,)
-        Of the squares in coordinates, about the minimum: about zero, rounding would hide differences of the evidence.
+        Derivatives of the squares about the minimum: about zero, rounding would hide differences of the evidence.
     apart : ndarray, shape (r,)
-        Members less their mean at the minimum, in units of their values or logarithms.
+        Members minus their mean at the minimum, in units of their values or logarithms.
     rows : ndarray, shape (r, p)
-        Members less their mean, in units of their values or logarithms.
+        Derivatives of members minus their mean, in units of their values or logarithms.
     of_row : ndarray, shape (r,)
-        Of which mean.
+        Number of the mean of each row.
     sizes : ndarray
-        What spreads are relative to.
+        Values that spreads are relative to.
     """
 
     information: FloatArray
@@ -558,7 +565,7 @@ class _SharedPriors:
 
 
 def _spreads(vector: ParameterVector, minimum: Minimum) -> tuple[CommonMean, ...]:
-    """Return the means with the standard deviations that a minimum found with others shows."""
+    """Return the means with the standard deviations at a minimum that was found with other ones."""
     shared, means = _SharedPriors.of(vector, minimum), vector.means
     std, count = np.array([one.std for one in means]), np.array([len(one.members) for one in means])
     given = np.array([np.nan if one.relative is None else one.relative for one in means]) * shared.sizes
@@ -580,12 +587,12 @@ def _spreads(vector: ParameterVector, minimum: Minimum) -> tuple[CommonMean, ...
 
 
 def spread_factors(vector: ParameterVector, minimum: Minimum) -> FloatArray:
-    """Return by how much variances of the coordinates grow because spreads that were found are not known, shape (p,).
+    """Return the factors by which uncertain spreads increase variances of the coordinates, shape (p,).
 
     Notes
     -----
-    The law of total variance over the posterior of each spread: few joints, or joints that the FRFs do not separate,
-    leave it wide.
+    The law of total variance over the posterior of each spread: it is wide for few joints, or for joints that the FRFs
+    do not separate.
     """
     shared = _SharedPriors.of(vector, minimum)
     std = np.array([one.std for one in vector.means])
@@ -615,7 +622,7 @@ def spread_factors(vector: ParameterVector, minimum: Minimum) -> FloatArray:
 
 
 def _most_likely(squares: float, count: int, size: float) -> float:
-    """Return the spread at the largest likelihood times its prior: (m - 1) s^2 + s^3 / u = squares."""
+    """Return the spread at the maximum of likelihood and prior: (m - 1) s^2 + s^3 / u = squares."""
     from scipy.optimize import brentq  # takes long to import, and is seldom needed
 
     usual, largest = _USUAL_SPREAD * size, float(np.sqrt(squares / (count - 1)))

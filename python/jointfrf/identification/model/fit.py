@@ -1,4 +1,4 @@
-"""From a prepared problem to numbers: starts, minimum, noise once more, covariance, tests."""
+"""From a prepared problem to numbers: initial values, minimum, update of the noise, covariance, tests."""
 
 from __future__ import annotations
 
@@ -54,30 +54,30 @@ __all__ = [
     "unseparated",
 ]
 
-#: A start is good whose minimum leaves a residual below this many times the noise.
+#: Ratio of residual to noise at a minimum below which its initial value is good.
 _GOOD = 1.1
-#: Errors of models that engineers would call small: then the joint is not far off, either.
+#: Model errors that engineers would call small: the error of the joint is then small, too.
 _SMALL_ERROR = 0.02
-#: Starts that are followed to their minimum at most.
+#: Maximum number of initial values that are followed to their minimum.
 _FOLLOWED = 4
-#: Noise of FRFs of substructures is taken near the minimum so many times: what it does there depends on the joint.
+#: Number of updates of the noise of FRFs of substructures near the minimum: its effect depends on the joint.
 _TURNS = 2
-#: From this variance factor on most of a variance is that of spreads which are not known.
+#: Variance factor above which uncertain spreads cause most of a variance.
 _OF_SPREAD = 2.0
-#: Reductions of the models are extended at most so many times.
+#: Maximum number of extensions of the reductions of the models.
 _REFINED = 3
-#: Of a value that is known to this many times the one it began with, and this many units, at best, FRFs say nothing:
-#: the rest is rounding.
+#: Ratio of the standard deviation to the initial value, and in units, above which FRFs do not determine a value: the
+#: rest is rounding.
 _BLIND = 1e9
-#: The parameters of a fit have not taken up more of the noise than this.
+#: Largest share of the noise that the parameters of a fit absorb.
 _MOST_TAKEN = 0.9
-#: A gain is named that differs from 1 by so many standard deviations: by chance one of 400 does.
+#: Deviation of a gain from 1, in standard deviations, above which it is named: by chance one of 400 is.
 _NAMED_GAIN = 3.0
 #: Errors that are gains.
 _GAIN_ERRORS = ("response-error", "force-error", "common-error")
 #: Share of a standard error that is noticeable.
 _TENTH = 0.1
-#: -2 log likelihood of two points that differ by less is the same.
+#: Difference of -2 log likelihood below which two points are equal.
 _SAME = 1e-3
 
 
@@ -88,24 +88,28 @@ class ModelProblem:
     Attributes
     ----------
     prediction : Prediction
+        FRFs of the assembly.
     vector : ParameterVector
+        Parameters.
     freq_hz : ndarray, shape (n_freq,)
+        Frequencies, Hz.
     measured : ndarray, shape (n_freq, n_o, n_i)
-        m/N; NaN where nothing is measured.
+        Measured receptances, m/N; NaN if not measured.
     variance : ndarray, shape (n_freq, n_o, n_i)
-        E|e|^2, inf where nothing is measured.
+        Noise variance E|e|^2, (m/N)^2, inf if not measured.
     smooth : ndarray, shape (n_freq, n_o, n_i)
-        Smooth FRFs.
+        Smooth FRFs, m/N.
     noise : KnownNoise
+        Noise of the FRFs.
     joint_channels : pair of list of int, or None
-        Responses and forces at the joint DOFs j, then k, where all are measured.
+        Responses and forces at the joint DOFs j, then k, if all are measured.
     compliance_start : callable or None
-        Returns values of the joint from the compliance fit, or None.
+        Function that returns values of the joint from the compliance fit, or None.
     tested : ndarray, shape (n_freq, n_o, n_i), optional
-        E|e|^2 found without the models, which the residual is compared with; `variance` by default.
+        Noise variance estimated without the models, for the test of the residual; `variance` by default.
     shared : ndarray, shape (n_freq, n_o, n_i, n_sources), optional
-        What noise of FRFs of the substructures does to those of the assembly near the minimum, m/N: as large as it
-        counts over lines that are correlated.
+        Effect of noise of FRFs of the substructures on FRFs of the assembly near the minimum, m/N, multiplied by the
+        factor for correlated lines.
     motion : ndarray, shape (n_freq,), optional
         Size of the motion on each line, if the FRFs depend on amplitude.
     """
@@ -131,7 +135,7 @@ class ModelProblem:
         )
 
     def near(self, minimum: Minimum) -> ModelProblem:
-        """Return the same with the noise of substructures as it is near a minimum."""
+        """Return the same with the noise of substructures near a minimum."""
         if not self.prediction.has_noisy_parts:
             return self
         return replace(self, shared=self.prediction.part_noise(self.vector, self.vector.to_values(minimum.x)))
@@ -143,11 +147,11 @@ class GainError(NamedTuple):
     Attributes
     ----------
     origin : str
-        "response-error", "force-error" or "common-error".
+        Kind: "response-error", "force-error" or "common-error".
     channel : int
         Number of the response or force.
     value, std : float
-        Measured over true, and its standard deviation.
+        Measured over true value, and its standard deviation.
     """
 
     origin: str
@@ -162,34 +166,39 @@ class FoundModel(NamedTuple):
     Attributes
     ----------
     problem : ModelProblem
-        With the noise used in the end.
+        Problem with the final noise.
     minimum : Minimum
+        Minimum of -2 log likelihood.
     values : ndarray
-        Of all parameters.
+        Values of all parameters.
     covariance : ndarray, shape (p, p)
-        Of the values of the free parameters.
+        Covariance of the free parameters.
     intervals : Intervals
+        Intervals of the free parameters.
     predicted : ndarray, shape (n_freq, n_o, n_i)
+        Fitted FRFs, m/N.
     residual : ndarray, shape (n_freq, n_o, n_i)
-        Over the standard deviation of the noise; NaN where nothing is measured.
+        Residual over the standard deviation of the noise; NaN if not measured.
     test : ResidualTest
+        Test of the residual without errors of models and gains.
     directions : tuple of OpenDirection
+        Combinations of parameters that the FRFs do not determine.
     other : float
-        Squares by which the next lowest minimum of another start is higher; inf where none was followed.
+        Squares at the next lowest minimum minus squares at the lowest; inf if there is no second one.
     error : Errors or None
-        Errors of models and gains beside the unknowns, if the FRFs show any or priors allow for them.
+        Errors of models and gains in addition to the unknowns, if FRFs show any or priors include them.
     gains : tuple of GainError
         Gains among these errors that differ from 1.
     test_with_error : ResidualTest
-        Of the residual, with these; `test` is that without them.
+        Test of the residual with these errors.
     spread : Spread
-        Variance factors by what FRFs share.
+        Variance factors by errors that FRFs share.
     added : Added
-        What smooth errors of channels add to the coordinates.
+        Contribution of smooth errors of channels to the uncertainty of the coordinates.
     unseparated : tuple of Unseparated
-        Parameters of several joints that the FRFs do not tell apart.
+        Parameters of several joints that the FRFs do not separate.
     parts : BandHomogeneity
-        The coordinates by part of the band.
+        Coordinates by part of the band.
     error_matters : bool
         Whether these errors change the joint or its intervals noticeably.
     """
@@ -215,13 +224,13 @@ class FoundModel(NamedTuple):
 
     @property
     def has_failed(self) -> bool:
-        """Whether the fit came to no minimum because the models do not fit the FRFs: no interval follows from it."""
+        """Whether the fit has no minimum because the models do not fit the FRFs: it has no intervals."""
         return not self.minimum.converged and self.test_with_error.is_large
 
 
 def fit_assembly(problem: ModelProblem) -> FoundModel:
     """Fit all free parameters by maximum likelihood."""
-    # On matrices as small as reduced models, threads of a BLAS wait for each other most of the time.
+    # For matrices as small as reduced models, threads of a BLAS wait for each other most of the time.
     with (
         one_thread(of_blas_only=True),
         warnings.catch_warnings(),
@@ -244,11 +253,11 @@ def fit_assembly(problem: ModelProblem) -> FoundModel:
             problem = changed
             minimum = minimise(problem.likelihood, minimum.x)
         likelihood, minimum = with_spreads(problem.likelihood, minimum)
-        return _judged(replace(problem, vector=likelihood.vector), minimum, other)
+        return _result_at(replace(problem, vector=likelihood.vector), minimum, other)
 
 
 def _explained(problem: ModelProblem, minimum: Minimum) -> float:
-    """Return the residual over the noise, that of the substructures with it."""
+    """Return the residual over the noise, including noise of the substructures."""
     likelihood = problem.near(minimum).likelihood
     return _ratio(likelihood, minimum._replace(cost=likelihood.cost(minimum.x)), problem.noise.inflation)
 
@@ -261,7 +270,7 @@ def _ratio(likelihood: Likelihood, minimum: Minimum, inflation: float) -> float:
 
 
 def lowest_minimum(problem: ModelProblem, known: Minimum | None = None) -> tuple[Minimum, float]:
-    """Return the lowest minimum of several starts, and by how much the next one is higher: one known, if it fits."""
+    """Return the lowest minimum, and the height of the next one above it: of a known one, if it fits."""
     likelihood, vector = problem.likelihood, problem.vector
     given: list[FloatArray] = []
     found: list[Minimum] = []
@@ -286,7 +295,7 @@ def lowest_minimum(problem: ModelProblem, known: Minimum | None = None) -> tuple
 
 
 def _values_of_equal(problem: ModelProblem) -> Iterator[FloatArray]:
-    """Yield the values where joints of the same laws are equal: few unknowns are found from anywhere."""
+    """Yield values with equal parameters for joints of the same laws, because few unknowns converge from anywhere."""
     equal = problem.vector.of_equal_joints()
     if equal is not None:
         likelihood = replace(problem, vector=equal).likelihood
@@ -299,7 +308,7 @@ def _values_of_equal(problem: ModelProblem) -> Iterator[FloatArray]:
 
 
 def _is_explained(problem: ModelProblem, minimum: Minimum) -> bool:
-    """Whether small errors of the models explain what the residual has beside the noise: no other start is needed."""
+    """Return whether small model errors explain the residual above the noise: no other initial value is needed."""
     found = with_errors(problem.likelihood, minimum, common_gain(problem), at_most=_SMALL_ERROR)
     if found is None or found[2].largest_level >= _SMALL_ERROR:
         return False
@@ -307,9 +316,9 @@ def _is_explained(problem: ModelProblem, minimum: Minimum) -> bool:
 
 
 def _values_of_lines(problem: ModelProblem) -> Iterator[FloatArray]:
-    """Yield values of all parameters by the joint of single lines, without and with the models; by the compliance fit.
+    """Yield values of all parameters: from single lines without models, with models, and from the compliance fit.
 
-    The first and the last where the FRFs between all joint DOFs were measured.
+    The first and the last need FRFs between all joint DOFs.
     """
     vector, prediction = problem.vector, problem.prediction
     joint, omega = prediction.whole.joint, prediction.omega
@@ -333,7 +342,7 @@ def _values_of_lines(problem: ModelProblem) -> Iterator[FloatArray]:
 
 
 def _with_noise_of_model(problem: ModelProblem, minimum: Minimum) -> ModelProblem | None:
-    """Return the problem with noise about fitted FRFs where these fit, or of the level of the residual."""
+    """Return the problem with noise about fitted FRFs if these fit, or with noise at the level of the residual."""
     likelihood = problem.likelihood
     ratio = _ratio(likelihood, minimum, problem.noise.inflation)
     if problem.noise.is_assumed:
@@ -341,7 +350,7 @@ def _with_noise_of_model(problem: ModelProblem, minimum: Minimum) -> ModelProble
     if problem.noise.stated is not None:
         return _with_stated_noise(problem, problem.noise.stated, minimum) if ratio <= _GOOD else None
     noise = problem.noise.model
-    # About fitted FRFs there is the noise of the substructures, too.
+    # The residual of fitted FRFs includes the noise of the substructures.
     is_apart = problem.shared is None and noise is not None and noise.source == "residual" and ratio <= _GOOD
     if noise is None or not is_apart or noise.coherence_factor.any():
         return None
@@ -356,7 +365,7 @@ def _with_noise_of_model(problem: ModelProblem, minimum: Minimum) -> ModelProble
     found = replace(problem, variance=variance, tested=tested, smooth=predicted)
     if in_pieces or noise.inflation_source != "residual":
         return found
-    # What a rational function has missed of peaks is alike on neighbouring lines, and no noise.
+    # Errors of a rational function at peaks are equal on neighbouring lines, and no noise.
     rest = ((problem.measured - predicted) / np.sqrt(variance))[:, np.isfinite(variance).all(axis=0)].T
     used = np.where(noise.line_factor > 1, np.nan, rest)
     taken = min(minimum.x.size / max(2 * used.size, 1), _MOST_TAKEN)
@@ -365,7 +374,7 @@ def _with_noise_of_model(problem: ModelProblem, minimum: Minimum) -> ModelProble
 
 
 def _with_stated_noise(problem: ModelProblem, stated: StatedNoise, minimum: Minimum) -> ModelProblem:
-    """Return the problem with noise relative to the fitted FRFs: measured ones favour lines that noise made small."""
+    """Return the problem with noise relative to the fitted FRFs: measured ones give small values too much weight."""
     predicted = problem.prediction.frfs(problem.vector, problem.vector.to_values(minimum.x))
     variance = stated.variance(problem.freq_hz, predicted)
     usable = np.isfinite(problem.variance) & (variance > 0)
@@ -373,17 +382,17 @@ def _with_stated_noise(problem: ModelProblem, stated: StatedNoise, minimum: Mini
 
 
 def _about(problem: ModelProblem, noise: NoiseModel, predicted: ComplexArray) -> FloatArray:
-    """Return E|e|^2 by what measured FRFs differ from fitted ones, relative part and floor by entry.
+    """Return E|e|^2 from the difference of measured and fitted FRFs, relative part and floor by entry.
 
-    Smooth FRFs are off at antiresonances, which looks like a floor and hides what small FRFs say.
+    Smooth FRFs have errors at antiresonances, which look like a floor and hide the information of small FRFs.
     """
     used = np.isfinite(problem.variance).all(axis=0)
     outlying = noise.line_factor
     squares = np.asarray(abs((problem.measured - predicted)[:, used].T) ** 2, float)
     size, good = np.asarray(abs(predicted[:, used].T) ** 2, float), outlying == 1
-    # A floor of acceleration may describe the slow variation that was found without models.
+    # A floor of acceleration may describe the slow variation that was estimated without models.
     choices: list[tuple[FloatArray, FloatArray]] = [(noise.line_level, noise.floor_shape(problem.freq_hz))]
-    if noise.inflation_source != "none":  # noise that is to stay as it was found
+    if noise.inflation_source != "none":  # noise that is to stay unchanged
         choices.append((np.ones(good.size), acceleration_floor(problem.freq_hz)))
     least, variance = np.inf, np.full(predicted.shape, np.inf)
     for usual, shape in choices:
@@ -395,36 +404,36 @@ def _about(problem: ModelProblem, noise: NoiseModel, predicted: ComplexArray) ->
     return variance
 
 
-def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel:
-    """Return covariance, intervals and tests at a minimum, where what FRFs say nothing of is as it was believed."""
+def _result_at(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel:
+    """Return covariance, intervals and tests at a minimum, with nominal values for undetermined parameters."""
     likelihood = problem.likelihood
     residual, predicted = _residual(problem, likelihood, minimum)
     test = with_error = _test(problem, likelihood, minimum, residual, predicted)
-    # Of a residual that errors of channels explain, none is one of the models.
+    # If errors of channels explain a residual, it contains none of the models.
     explained = problem.noise.calibration is not None and test.is_noise
     without, found = minimum, with_errors(likelihood, minimum, common_gain(problem), is_sought=not explained)
-    is_rejected = found is None or not found[1].converged  # errors of these kinds do not describe what is wrong
+    is_rejected = found is None or not found[1].converged  # errors of these kinds do not describe the misfit
     if is_rejected and without.converged:
         found = None
     if is_rejected and test.is_large and not explained:
         found = with_discrepancy(likelihood, without, problem.noise.inflation, test.ratio)
-        minimum = without._replace(converged=False)  # without errors the fit is of models that do not fit
+        minimum = without._replace(converged=False)  # without errors the models do not fit
     if found is not None:
         likelihood, minimum = found[:2]
         residual, predicted = _residual(problem, likelihood, minimum)
         with_error = _test(problem, likelihood, minimum, residual / found[2].noise, predicted)
     vector, n = likelihood.vector, likelihood.vector.n_shown
-    # Of logarithms of the joint none: far away they may well be seen.
+    # Not for logarithms of the joint: FRFs may well determine distant values.
     least = (_BLIND * np.maximum(1.0, 1 / vector.scale)) ** -2
     of_joint = np.array([one.origin in ("joint", "mean") for one in vector.fitted], bool)
     blind = ~(vector.is_log & of_joint) & (np.diagonal(minimum.information) <= least)
     if blind.any():
-        # What they were believed to be is as good as where rounding has led.
+        # The nominal value is as good as the one to which rounding has led.
         believed = np.where(blind, vector.to_coordinates(vector.values), minimum.x)
         blind &= bool(likelihood.cost(believed) < minimum.cost + _SAME)
         minimum = minimum._replace(x=np.where(blind, believed, minimum.x))
     values = vector.to_values(minimum.x)
-    matters = found is not None and _matters(vector, without, minimum)
+    matters = found is not None and _changes_joint(vector, without, minimum)
     at = ModelLinearised.of(likelihood, minimum, problem.noise.inflation)
     every_line = np.ones((1, problem.freq_hz.size))
     shape = problem.measured.shape[1], problem.measured.shape[2]
@@ -465,7 +474,7 @@ def common_gain(problem: ModelProblem) -> float:
     calibration = problem.noise.calibration
     said = None if calibration is None or calibration.setups is None else calibration.setups.setups
     if said is not None and (said.gain is not None or said.common_gain > 0):
-        return 0.0  # what was stated is in the intervals beside the fit
+        return 0.0  # stated errors are in the intervals separately from the fit
     return GAIN if any(side.part.is_uncertain for side in problem.prediction.sides) else 0.0
 
 
@@ -480,8 +489,8 @@ def _gains(vector: ParameterVector, minimum: Minimum) -> tuple[GainError, ...]:
     )
 
 
-def _matters(vector: ParameterVector, without: Minimum, minimum: Minimum) -> bool:
-    """Whether errors of the models change the joint, or widen its intervals, by a tenth of a standard error."""
+def _changes_joint(vector: ParameterVector, without: Minimum, minimum: Minimum) -> bool:
+    """Return whether model errors change the joint, or widen its intervals, by a tenth of a standard error."""
     n = vector.n_shown
     joint = np.array([one.origin in ("joint", "mean") for one in vector.fitted[:n]], bool)
     before, after = (np.diagonal(inverse_information(one.information))[:n][joint] for one in (without, minimum))
@@ -491,9 +500,9 @@ def _matters(vector: ParameterVector, without: Minimum, minimum: Minimum) -> boo
 
 @dataclass(frozen=True)
 class _Profiles:
-    """Profiles of the parameters at a minimum, each with its variance factor.
+    """Profiles of the parameters at a minimum, with a variance factor for each.
 
-    The likelihood has one spread for joints that are alike: where most of a variance is due to others, `of_spread`, the
+    The likelihood has one spread for similar joints. If most of a variance is due to other spreads, `of_spread`, the
     interval follows from it. There is none if the fit has failed.
     """
 
@@ -519,7 +528,7 @@ class _Profiles:
             low, high = (self.vector.value(i, self.minimum.x + sign * step) for sign in (-1, 1))
             return low, high
         with one_thread(of_blas_only=True), warnings.catch_warnings():
-            warnings.simplefilter("ignore", IllConditionedWarning)  # on the way to limits that are far off
+            warnings.simplefilter("ignore", IllConditionedWarning)  # during the search for distant limits
             return self._profile(float(self.factor[i])).of(i, probability)
 
     def of_function(
@@ -538,21 +547,21 @@ class _Profiles:
 
 
 def _residual(problem: ModelProblem, likelihood: Likelihood, minimum: Minimum) -> tuple[ComplexArray, ComplexArray]:
-    """Return the residual over the noise, and the FRFs fitted."""
+    """Return the residual over the noise, and the fitted FRFs."""
     vector = likelihood.vector
     predicted = problem.prediction.frfs(vector, vector.to_values(minimum.x))
     if likelihood.whitening is not None:
-        # Noise of substructures is shared by the FRFs of a line: their combinations are independent.
+        # FRFs of a line share noise of substructures: their combinations are independent.
         size = np.where(likelihood.used, np.sqrt(problem.noise.inflation / 2), np.nan)
         return likelihood.weighted(likelihood.difference(predicted)) * size, predicted
     return (likelihood.measured - predicted) / _tested(problem, likelihood), predicted
 
 
 def _tested(problem: ModelProblem, likelihood: Likelihood) -> FloatArray:
-    """Return the standard deviation of the noise that the residual is compared with; NaN where nothing is measured."""
+    """Return the standard deviation of the noise for the test of the residual; NaN if nothing was measured."""
     tested = problem.variance if problem.tested is None else problem.tested
     if problem.shared is not None:
-        # Its lines are taken to be correlated as those of the FRFs of the assembly.
+        # Its lines have the correlation of the FRFs of the assembly.
         tested = tested + (abs(problem.shared) ** 2).sum(axis=-1) / problem.noise.inflation
     return np.sqrt(np.where(likelihood.used, tested, np.nan))
 
@@ -560,7 +569,7 @@ def _tested(problem: ModelProblem, likelihood: Likelihood) -> FloatArray:
 def _test(
     problem: ModelProblem, likelihood: Likelihood, minimum: Minimum, residual: ComplexArray, predicted: ComplexArray
 ) -> ResidualTest:
-    """Compare a residual with noise and calibration; terms that their priors hold use up less of it than free ones."""
+    """Compare a residual with noise and calibration; parameters with priors use fewer degrees of freedom."""
     n, errors = likelihood.vector.n_shown, problem.noise.calibration
     of_priors = np.diagonal(likelihood.vector.prior_information(minimum.x))[n:]
     held = float(of_priors @ np.diagonal(inverse_information(minimum.information))[n:])
@@ -574,26 +583,26 @@ def _test(
     )  # fmt: skip
 
 
-#: A direction is open where moving its parameters by this share, or by a standard deviation of their prior, changes
-#: -2 log likelihood by less than 1.
+#: The FRFs do not determine a direction if -2 log likelihood changes by less than 1 when its parameters change by this
+#: share, or by a standard deviation of their prior.
 _SHARE = 0.3
-#: Components below this part of the largest are not named.
+#: Relative size of components below which they are not named.
 _NAMED = 0.2
-#: Parameters of a space of directions belong together where the cosine between their parts of it exceeds this.
+#: Cosine between parts of a space of directions above which parameters belong together.
 _LINKED = 0.05
 
 
 class OpenDirection(NamedTuple):
-    """A combination of parameters that the FRFs hardly change with.
+    """A combination of parameters with hardly any effect on the FRFs.
 
     Attributes
     ----------
     parts : tuple of (str, float)
-        Name of each parameter, and by how much of its value it changes, the largest first.
+        Name of each parameter, and its relative change, the largest first.
     std : float
-        Standard deviation of the combination from the FRFs alone, in units of `parts`; inf where they say nothing.
+        Standard deviation of the combination from the FRFs alone, in units of `parts`; inf if they do not determine it.
     is_held_by_prior : bool
-        Whether priors hold it.
+        Whether priors determine it.
     """
 
     parts: tuple[tuple[str, float], ...]
@@ -602,13 +611,14 @@ class OpenDirection(NamedTuple):
 
 
 def open_directions(vector: ParameterVector, x: FloatArray, information: FloatArray) -> tuple[OpenDirection, ...]:
-    """Return the directions that the FRFs do not hold.
+    """Return the directions that the FRFs do not determine.
 
     Parameters
     ----------
     vector : ParameterVector
+        Parameters.
     x : ndarray, shape (p,)
-        Coordinates found.
+        Coordinates of the minimum.
     information : ndarray, shape (p, p)
         Half of the second derivatives of -2 log likelihood with priors, in coordinates.
 
@@ -617,7 +627,7 @@ def open_directions(vector: ParameterVector, x: FloatArray, information: FloatAr
     Eigenvectors of the information of the FRFs alone, in units of a share of each value, or of its prior.
     """
     values, slope = vector.to_values(x)[vector.free], vector.slope(x)
-    # What a mean is, no FRF says but by its members.
+    # FRFs determine a mean only through its members.
     seen = [i for i, one in enumerate(vector.fitted) if one.origin != "mean"]
     of_priors = vector.pull_slopes(x)[:, seen]
     of_frfs = information[np.ix_(seen, seen)] - of_priors.T @ of_priors
@@ -628,7 +638,7 @@ def open_directions(vector: ParameterVector, x: FloatArray, information: FloatAr
     scaled = of_frfs * np.outer(unit, unit)
     value, turned = np.linalg.eigh(scaled)
     found = []
-    for direction in _apart(turned[:, value < 1]).T:
+    for direction in _disjoint(turned[:, value < 1]).T:
         size, largest = float(direction @ scaled @ direction), abs(direction).max()
         change = direction * unit * slope / np.where(values == 0, 1, abs(values))
         change = change * np.sign(direction[abs(direction).argmax()])
@@ -644,8 +654,8 @@ def open_directions(vector: ParameterVector, x: FloatArray, information: FloatAr
     return tuple(found)
 
 
-def _apart(directions: FloatArray) -> FloatArray:
-    """Return directions of the same space that share no parameters, as far as there are such; in columns."""
+def _disjoint(directions: FloatArray) -> FloatArray:
+    """Return directions of the same space that share no parameters, as far as possible; in columns."""
     if directions.shape[1] < 2:
         return directions
     within = directions @ directions.T  # does not depend on which directions span the space
@@ -665,14 +675,16 @@ def _apart(directions: FloatArray) -> FloatArray:
 
 
 class Unseparated(NamedTuple):
-    """Parameters of several joints that the FRFs do not tell apart.
+    """Parameters of several joints that the FRFs do not separate.
 
     Attributes
     ----------
     names : tuple of str
+        Names of the parameters.
     known : tuple of (tuple of float, float)
-        Sums of them that are known: their coefficients, the largest is 1, and the standard deviation.
+        Determined sums of the parameters: their coefficients, of which the largest is 1, and the standard deviation.
     is_held_by_prior : bool
+        Whether priors determine them.
     """
 
     names: tuple[str, ...]
@@ -683,12 +695,12 @@ class Unseparated(NamedTuple):
 def unseparated(
     vector: ParameterVector, x: FloatArray, information: FloatArray, directions: Sequence[OpenDirection]
 ) -> tuple[Unseparated, ...]:
-    """Return the parameters of several joints that open directions connect, and what is known of them together.
+    """Return the parameters of several joints in undetermined directions, and their determined combinations.
 
     Notes
     -----
-    Known are the eigenvectors of the information of the FRFs on relative changes, all others being unknown, less the
-    open directions.
+    Determined combinations are the eigenvectors of the information of the FRFs on relative changes, with all further
+    parameters unknown, without the undetermined directions.
     """
     place = {one.name: i for i, one in enumerate(vector.fitted)}
     slope, of_frfs = vector.slope(x), information - vector.prior_information(x)

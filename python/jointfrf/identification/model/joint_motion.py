@@ -1,4 +1,4 @@
-"""How the joint of an assembly found moves on each line, and what each line adds to the fit."""
+"""Motion of the joint of a fitted assembly on each line, and the contribution of each line to the fit."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ __all__ = ["FoundMotion", "JointMotion"]
 
 
 class JointMotion(NamedTuple):
-    """Motion across the joint, and derivatives of the FRFs by what it does there.
+    """Motion across the joint, and derivatives of the FRFs by its dynamic stiffness.
 
     Attributes
     ----------
     per_force : ndarray, shape (n_freq, n, n_i)
-        Of each joint DOF, j less k, per force as measured, m/N or rad/N.
+        Motion of each joint DOF, j minus k, per measured force, m/N or rad/N.
     slopes : ndarray, shape (n, n_freq, n_o, n_i)
         Derivatives of the weighted FRFs by K*_dd.
     gradient : ModelLinearised
         Derivatives by the coordinates, residual, information.
     predicted : ndarray, shape (n_freq, n_o, n_i)
-        FRFs, m/N.
+        Fitted FRFs, m/N.
     """
 
     per_force: ComplexArray
@@ -42,13 +42,14 @@ class JointMotion(NamedTuple):
 
 
 class FoundMotion:
-    """The motion of the joint of a fit, when it is asked for; goes to other processes, without the start of the fit.
+    """Motion of the joint of a fit on demand; can be pickled, without the start of the fit.
 
     Parameters
     ----------
     found : FoundModel
+        Result of the fit.
     describe : callable
-        Makes a result of what was found.
+        Function that makes a `Fit` of a result.
     """
 
     def __init__(self, found: FoundModel, describe: Callable[[FoundModel], Any]) -> None:
@@ -56,9 +57,9 @@ class FoundMotion:
 
     @staticmethod
     def _as_found(problem: ModelProblem) -> ModelProblem:
-        """Return a problem with the correlation of lines that was found without models, which stays so.
+        """Return a problem with the correlation of lines that was estimated without models, which stays fixed.
 
-        A law of the amplitude misses a joint by as much as rational functions miss its FRFs.
+        The misfit of a law of the amplitude is as large as the misfit of rational functions.
         """
         model = problem.noise.model
         if model is None:
@@ -67,7 +68,7 @@ class FoundMotion:
         return replace(problem, noise=replace(problem.noise, inflation=model.inflation, model=model))
 
     def refitted(self, joint: LawJoint) -> Any:
-        """Return the fit with another joint, all else starting from what was found; fixed parameters stay fixed."""
+        """Return the fit with another joint, from the present values; fixed parameters stay fixed."""
         found = self._found
         problem, vector = self._as_found(found.problem), found.problem.vector
         fixed = [one.name for one in vector.all if one.origin == "joint" and not one.is_free]
@@ -81,7 +82,7 @@ class FoundMotion:
         )
 
     def __call__(self) -> JointMotion:
-        """Return it at the parameters found, without errors of the models: they can look like a joint that changes."""
+        """Return the motion at the estimate, without model errors, which could look like a joint that changes."""
         found, problem = self._found, self._as_found(self._found.problem)
         likelihood, minimum = problem.likelihood, found.minimum
         vector, prediction = likelihood.vector, likelihood.prediction

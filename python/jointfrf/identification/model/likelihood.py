@@ -1,4 +1,4 @@
-"""Squares to be minimised: residuals of the FRFs over their noise, and how far priors are off."""
+"""Squares to be minimised: residuals of the FRFs over their noise, and deviations from priors."""
 
 from __future__ import annotations
 
@@ -23,11 +23,13 @@ class WeightedResiduals(ABC):
     Attributes
     ----------
     prediction : Prediction
+        FRFs of the assembly.
     vector : ParameterVector
+        Parameters.
     measured : ndarray, shape (n_freq, n_o, n_i)
-        m/N.
+        Measured receptances, m/N.
     weight : ndarray, shape (n_freq, n_o, n_i)
-        1 over the standard deviation of real and imaginary part; 0 for what is not measured.
+        Inverse standard deviation of real and imaginary part; 0 if not measured.
     """
 
     prediction: Prediction
@@ -37,7 +39,7 @@ class WeightedResiduals(ABC):
 
     @property
     def unit(self) -> float:
-        """The squares are those of real numbers over their standard deviation."""
+        """Unit of the squares, which are squares of real numbers over their standard deviation."""
         return 1.0
 
     @property
@@ -51,7 +53,7 @@ class WeightedResiduals(ABC):
 
     @property
     def used(self) -> NDArray[np.bool_]:
-        """What is measured, shape (n_freq, n_o, n_i)."""
+        """Which FRFs are measured, shape (n_freq, n_o, n_i)."""
         return self.weight > 0
 
     @abstractmethod
@@ -60,14 +62,14 @@ class WeightedResiduals(ABC):
 
     @abstractmethod
     def weigh_slopes(self, y: ComplexArray, slopes: ComplexArray) -> ComplexArray:
-        """Return minus derivatives of the weighted difference by those of the predicted FRFs, which may be changed."""
+        """Return minus derivatives of the weighted difference from derivatives of the FRFs, which may be changed."""
 
     def weighted(self, frfs: ComplexArray) -> ComplexArray:
         """Return differences of FRFs, frequency first of the last three axes, by their standard deviation."""
         return frfs * self.weight
 
     def cost(self, x: FloatArray) -> float:
-        """Return the sum of the squares; inf where a line is singular, or errors of a model make its mass negative."""
+        """Return the sum of the squares; inf if a line is singular, or model errors make the mass negative."""
         try:
             y = self.prediction.frfs(self.vector, self.vector.to_values(x))
         except np.linalg.LinAlgError:
@@ -76,7 +78,7 @@ class WeightedResiduals(ABC):
         return squares if np.isfinite(squares) else np.inf
 
     def linearised(self, x: FloatArray) -> NormalEquations:
-        """Return the squares with information and gradient; infinite squares without where `cost` has none."""
+        """Return the squares with information and gradient; infinite squares if `cost` is infinite."""
         try:
             predicted = self.prediction.linearised(self.vector, self.vector.to_values(x))
         except np.linalg.LinAlgError:
@@ -84,7 +86,7 @@ class WeightedResiduals(ABC):
         return self.about(x, *predicted)
 
     def about(self, x: FloatArray, y: ComplexArray, slopes: ComplexArray) -> NormalEquations:
-        """Return the same by the prediction and its derivatives, which may be changed."""
+        """Return the same from the prediction and its derivatives, which may be changed."""
         vector = self.vector
         residual = np.ascontiguousarray(self.weighted(self.difference(y)).ravel())
         slopes = np.ascontiguousarray(self.weigh_slopes(y, slopes))
@@ -98,13 +100,13 @@ class WeightedResiduals(ABC):
 
 @dataclass(frozen=True)
 class Likelihood(WeightedResiduals):
-    """-2 log likelihood of measured FRFs with circular noise, and of priors, but for a constant.
+    """-2 log likelihood of measured FRFs with circular noise, and of priors, up to a constant.
 
     Attributes
     ----------
     whitening : ndarray, shape (n_freq, n_o n_i, n_o n_i), optional
-        Lower triangles that make the FRFs of a line independent and of unit variance, where noise is not independent
-        between them; by default `weight` does.
+        Lower triangles that make the FRFs of a line independent and of unit variance, if their noise is correlated; by
+        default `weight` does.
     """
 
     whitening: ComplexArray | None = None
@@ -119,17 +121,17 @@ class Likelihood(WeightedResiduals):
         inflation: float,
         shared: ComplexArray | None = None,
     ) -> Likelihood:
-        """Return the likelihood for noise of this variance E|e|^2, infinite where nothing is measured.
+        """Return the likelihood for noise of this variance E|e|^2, infinite if nothing was measured.
 
-        `shared`, shape (n_freq, n_o, n_i, n_sources), is what each independent error, of E|e|^2 = 1, adds to the FRFs:
-        the covariance of the noise of a line is diag(inflation variance) + shared shared^H.
+        `shared`, shape (n_freq, n_o, n_i, n_sources), is the effect of independent errors with E|e|^2 = 1 on the FRFs.
+        The covariance of the noise of a line is diag(inflation variance) + shared shared^H.
         """
         usable = np.isfinite(variance) & (variance > 0)
         inverse = np.sqrt(2 / (inflation * np.where(usable, variance, 1)))
         weight = np.where(usable, inverse, 0)
         whitening: ComplexArray | None = None
         if shared is not None:
-            # In units of the noise of each FRF by itself, whose weight is that of its real part.
+            # In units of the noise of each FRF alone, whose weight is the weight of its real part.
             scaled = (shared * weight[..., None] / np.sqrt(2)).reshape(len(weight), -1, shared.shape[-1])
             covariance = scaled @ scaled.conj().swapaxes(1, 2)
             covariance[:, range(scaled.shape[1]), range(scaled.shape[1])] += 1
@@ -162,7 +164,7 @@ class Likelihood(WeightedResiduals):
 
     @property
     def precision(self) -> FloatArray:
-        """Squares that a unit of each FRF by itself leaves, shape (n_freq, n_o, n_i)."""
+        """Squares for a unit error of each FRF alone, shape (n_freq, n_o, n_i)."""
         if self.whitening is None:
             return np.asarray(self.weight**2)
         return np.asarray((abs(self.whitening) ** 2).sum(axis=1).reshape(self.weight.shape))
@@ -176,10 +178,10 @@ class Likelihood(WeightedResiduals):
 
 
 class LogLikelihood(WeightedResiduals):
-    """Squares of ln(measured / predicted): broad minima, for FRFs whose resonances are far off."""
+    """Squares of ln(measured / predicted): broad minima, for initial values with distant resonances."""
 
     def difference(self, y: ComplexArray) -> ComplexArray:
-        """Return ln(measured / predicted), 0 where there is no FRF."""
+        """Return ln(measured / predicted), 0 if there is no FRF."""
         known = (self.weight > 0) & (self.measured != 0) & (y != 0)
         return np.log(np.where(known, self.measured, 1) / np.where(known, y, 1))
 

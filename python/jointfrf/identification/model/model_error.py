@@ -12,12 +12,12 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["ErrorTerm", "ModalErrors"]
 
-#: Modes up to this many times the highest frequency mix with each other; of those above only the stiffness may be off.
+#: Modes up to this multiple of the highest frequency mix with each other; above, only the stiffness may have an error.
 _MIXED = 3.0
-#: Errors of meshes grow with this power of the frequency beyond the band: the square of the wave number times the size
-#: of solid elements, its fourth power for beams in bending, whose wave number goes with the root of the frequency.
+#: Power of the frequency with which errors of meshes grow beyond the band: 2 by the wave number times the size of solid
+#: elements; 4 for beams in bending, whose wave number is proportional to the root of the frequency.
 _GROWTH = 2.0
-#: A mode below this share of the highest frequency is one of a free body: it has no stiffness that could be off.
+#: Share of the highest frequency below which a mode is a rigid body mode, without a stiffness error.
 _RIGID = 1e-3
 
 
@@ -29,9 +29,9 @@ class ErrorTerm(NamedTuple):
     matrix : {"K", "M", "P"}
         Stiffness, mass, or mode shapes.
     row, column : int
-        Modes, row <= column; of mode shapes the number of the DOF, and the mode.
+        Numbers of the modes, row <= column; for mode shapes the number of the DOF, and the mode.
     weight : float
-        Its standard deviation for a level of 1: 1 of modal stiffnesses and masses in the band, more beyond it.
+        Standard deviation for a level of 1: 1 for modal stiffnesses and masses in the band, more beyond it.
     """
 
     matrix: str
@@ -59,14 +59,14 @@ class ModalErrors:
     Notes
     -----
     In mass-normalised modes K = diag(w_a^2) and M = 1. The errors are symmetric matrices G with independent normal
-    entries, as of the Gaussian orthogonal ensemble: K + W G_K W, W = diag(w_a), and M + G_M; entries on the diagonal
-    have twice the variance of others. These are random matrices about a mean model as in [1]_, to first order of the
-    dispersion, so that an error of E, of a section, a mass or a clamp is one draw of them; rigid bodies stay free.
-    Above the band the standard deviation grows with the square of the frequency, up to the ninefold.
+    entries, as in the Gaussian orthogonal ensemble: K + W G_K W, W = diag(w_a), and M + G_M. Entries on the diagonal
+    have twice the variance of further entries. These are random matrices about a mean model [1]_, to first order of the
+    dispersion. An error of E, of a section, a mass or a clamp is a realisation of them; rigid bodies stay free. Above
+    the band the standard deviation grows with the square of the frequency, up to the ninefold.
 
     Errors of mode shapes are independent between modes and DOFs, relative to the root mean square of all modes in the
-    band at the DOF: they change the residues of single FRFs, as positions of sensors, local flexibility and details of
-    the part do, and no natural frequency.
+    band at the DOF. They change the residues of single FRFs, as positions of sensors, local flexibility and details of
+    the part do, but no natural frequency.
 
     References
     ----------
@@ -116,9 +116,9 @@ class ModalErrors:
         Parameters
         ----------
         shapes, left, right
-            As in `slopes`.
+            Modes and their coordinates, see `slopes`.
         out, into : ndarray, shapes (n_freq, n_o, m), (n_freq, m, n_i)
-            dY = out dH into for the FRFs H between the DOFs.
+            Factors of dY = out dH into for the FRFs H between the DOFs.
         """
         turned = shapes.T @ self.of_mass[:, [one.column for one in self.shape_terms]]
         to_left, to_right = left @ turned, turned.T @ right
@@ -148,12 +148,13 @@ class ModalErrors:
         Parameters
         ----------
         shapes : ndarray, shape (r, r)
-            Modes of which `left` and `right` are coordinates.
+            Modes, of which `left` and `right` are coordinates.
         of_k : complex
-            By what a change of K enters Z: 1 + i eta times its factor.
+            Factor of a change of K in Z: 1 + i eta times its factor.
         of_m : ndarray, shape (n_freq,)
-            By what a change of M lowers Z: w^2 times its factor.
+            Factor of a change of M in -Z: w^2 times its factor.
         left, right : ndarray, shapes (n_freq, n_o, r), (n_freq, r, n_i)
+            Factors of dZ, in modal coordinates.
         """
         found = np.empty((len(self.terms), of_m.size, left.shape[1], right.shape[2]), np.complex128)
         factors = {"K": np.full(of_m.size, -of_k), "M": of_m + 0j}

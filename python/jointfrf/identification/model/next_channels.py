@@ -1,4 +1,4 @@
-"""What to measure next: the channels that would narrow the intervals of the joint most."""
+"""Channels to measure next: those that would narrow the intervals of the joint most."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["NextChannel", "NextChannels", "next_channels", "without_start"]
 
-#: DOFs of a part that are tried, spread over it, and lines at which.
+#: Number of DOFs of a part that are tried, spread over it, and number of lines.
 _TRIED, _LINES = 10, 100
-#: A channel that leaves more than this share of a standard error is not worth its sensor.
+#: Share of a standard error that remains above which a channel is not proposed.
 _WORTH = 0.9
 
 
@@ -29,12 +29,13 @@ class NextChannel(NamedTuple):
     Attributes
     ----------
     kind : {"response", "force"}
+        Kind of the channel.
     dof : str
-        ``"A/..."`` or ``"B/..."``.
+        DOF, ``"A/..."`` or ``"B/..."``.
     widest : str
-        The parameter of the joint whose interval is the widest.
+        Parameter of the joint with the widest interval.
     shares : dict of str to float
-        What of the standard error of each parameter of the joint would be left.
+        Ratio of the standard error with the channel to the present one, by parameter of the joint.
     """
 
     kind: str
@@ -44,7 +45,7 @@ class NextChannel(NamedTuple):
 
 
 class NextChannels:
-    """What to measure next, found when it is asked for, once; goes to other processes, without the start of the fit."""
+    """Channels to measure next, computed once on demand; can be pickled, without the start of the fit."""
 
     def __init__(self, found: FoundModel) -> None:
         self._found = without_start(found)
@@ -58,7 +59,7 @@ class NextChannels:
 
 
 def without_start(found: FoundModel) -> FoundModel:
-    """Return the same without the start of the fit, which does not go to other processes."""
+    """Return the same without the start of the fit, which cannot be pickled."""
     return found._replace(problem=replace(found.problem, compliance_start=_no_start))
 
 
@@ -67,13 +68,13 @@ def _no_start() -> None:
 
 
 def next_channels(found: FoundModel) -> tuple[NextChannel, ...]:
-    """Return channels whose FRFs with those measured would leave least of the standard errors of the joint, best first.
+    """Return channels that would reduce the standard errors of the joint most, best first.
 
     Notes
     -----
-    By the information of FRFs with the same relative noise and the same lines at the values found: translations of the
-    parts that are models, spread over them, and those of the joint. What of the widest parameter is left counts. FRFs
-    that are new are taken to follow the models, whose errors widen the intervals before and after.
+    The information is computed at the estimate for FRFs with the same relative noise and the same lines. Candidates are
+    translations of parts with models, spread over them, and of the joint. The ranking is by the standard error of the
+    widest parameter. New FRFs follow the models, whose errors widen the intervals before and after.
     """
     problem = found.problem
     prediction, vector = problem.prediction, problem.vector
@@ -110,7 +111,7 @@ def next_channels(found: FoundModel) -> tuple[NextChannel, ...]:
 
 
 def _without_errors(information: FloatArray, n: int) -> FloatArray:
-    """Return the information on the first n coordinates, the others being unknown: a Schur complement."""
+    """Return the information on the first n coordinates, with the rest unknown: a Schur complement."""
     if len(information) == n:
         return information
     cross = information[:n, n:]

@@ -38,18 +38,18 @@ __all__ = ["Prediction", "parameter_vector"]
 
 
 class _Open(NamedTuple):
-    """FRFs before the substructures are connected: they change with the models only.
+    """FRFs before the substructures are connected, which change with the models only.
 
     Attributes
     ----------
     h : ndarray, shape (n_freq, m, m)
-        Of all DOFs that matter, m/N.
+        Receptances of all DOFs of the problem, m/N.
     free : ndarray, shape (n_freq, n_o, n_i)
-        Of the channels.
+        Receptances of the channels, m/N.
     to_out, to_in : ndarray, shapes (n_freq, n_o, q), (n_freq, q, n_i)
-        From connections to responses, from forces to connections.
+        Receptances from connections to responses, and from forces to connections, m/N.
     between : ndarray, shape (n_freq, q, q)
-        Across the connections.
+        Receptances across the connections, m/N.
     """
 
     h: ComplexArray
@@ -60,16 +60,16 @@ class _Open(NamedTuple):
 
 
 class _Coupled(NamedTuple):
-    """FRFs, and what their derivatives are made of.
+    """FRFs, and factors of their derivatives.
 
     Attributes
     ----------
     y : ndarray, shape (n_freq, n_o, n_i)
-        Without gains, m/N.
+        Receptances without gains, m/N.
     w : ndarray, shape (n_freq, q, q)
-        Forces of the connections by the motions across them.
+        Forces of the connections by the motions across them, N/m.
     across_out, across_in : ndarray, shapes (n_freq, n_o, q), (n_freq, q, n_i)
-        dY = -across_out dT across_in.
+        Factors of dY = -across_out dT across_in.
     """
 
     y: ComplexArray
@@ -78,10 +78,10 @@ class _Coupled(NamedTuple):
     across_in: ComplexArray
 
 
-#: Errors of a part: of its modal matrices, of its mode shapes.
+#: Errors of a part: modal matrices, mode shapes.
 _MODEL_ERRORS: tuple[ParameterOrigin, ParameterOrigin] = ("error", "shape-error")
-#: Gains among the parameters: their origin, the gain without an error, and whether each is one of a response or of a
-#: force; None if it is one of all FRFs.
+#: Gains among the parameters: their origin, the gain without an error, and whether each belongs to a response or to a
+#: force; None for a gain of all FRFs.
 _GAINS: tuple[tuple[ParameterOrigin, float, bool | None], ...] = (
     ("response", 0.0, True), ("force", 0.0, False), ("response-error", 1.0, True), ("force-error", 1.0, False),
     ("common-error", 1.0, None),
@@ -99,7 +99,9 @@ class Prediction:
     Parameters
     ----------
     whole : Assembly
+        Assembly.
     freq_hz : ndarray, shape (n_freq,)
+        Frequencies, Hz.
     responses, forces : sequence of str
         DOFs ``"A/..."`` of the channels.
     """
@@ -109,7 +111,7 @@ class Prediction:
         self.places = places_of(whole, responses, forces)
         self.responses, self.forces = self.places.at(responses), self.places.at(forces)
         self._last: tuple[tuple[SubstructureState, ...], _Open] | None = None
-        # Every FRF that is asked for has a joint or an attachment, or both a response and a force, at its ends.
+        # Every requested FRF has a joint or an attachment, or both a response and a force, at its ends.
         between = {*itertools.chain(*whole.ports.ends), *itertools.chain(*(one.places for one in whole.attachments))}
         between |= {*(forces if len(forces) < len(responses) else responses)}
         self.sides = tuple(
@@ -124,11 +126,11 @@ class Prediction:
         )
 
     def joint_stiffness(self) -> FloatArray:
-        """Return the median over the lines of |(H_jj + H_kk)_dd|^-1, the size of stiffness that FRFs can show."""
+        """Return the median over the lines of |(H_jj + H_kk)_dd|^-1, the scale of stiffness that FRFs can show."""
         size = np.concatenate([abs(np.einsum("lpp->lp", side.at(side.part.nominal).h)) for side in self.sides], axis=1)
         ports, total = self.whole.ports, np.zeros((self.omega.size, len(self.whole.joint.dofs)))
         for own in ports.ends:
-            held = [i for i, dof in enumerate(own) if dof and not ports.term[i]]  # of a region its mean motion
+            held = [i for i, dof in enumerate(own) if dof and not ports.term[i]]  # for a region its mean motion
             total[:, ports.dof[held]] += size[:, self.places.at([own[i] for i in held])] * ports.weight[held]
         found: FloatArray = np.median(1 / np.maximum(total, np.finfo(float).tiny), axis=0)
         return found
@@ -136,23 +138,24 @@ class Prediction:
     def joint_compliance(
         self, vector: ParameterVector, smooth: ComplexArray, variance: FloatArray
     ) -> LineCompliance | None:
-        """Return the compliance of the joint on each line alone, all else being as believed.
+        """Return the compliance of the joint on each line alone, with nominal values for all further parameters.
 
         Parameters
         ----------
         vector : ParameterVector
+            Parameters.
         smooth, variance : ndarray, shape (n_freq, n_o, n_i)
-            Smooth FRFs, and E|e|^2 of the measured ones; inf for those that are zero by symmetry.
+            Smooth FRFs, m/N, and noise variance of the measured ones; inf for FRFs that are zero by symmetry.
 
         Returns
         -------
         LineCompliance or None
-            None where there are fewer responses or forces than joint DOFs, or a joint acts on a region.
+            Compliance of the joint; None with fewer responses or forces than joint DOFs, or with a joint on a region.
 
         Notes
         -----
-        Y = H_oi - H_oj W H_ji with W = (C + H_jj)^-1, j being the motions across the joint: by least squares, rows and
-        columns weighted by their noise.
+        Y = H_oi - H_oj W H_ji with W = (C + H_jj)^-1, where j are the motions across the joint: by least squares, rows
+        and columns weighted by their noise.
         """
         n = len(self.whole.joint.dofs)
         if min(smooth.shape[1:]) < n or not self.whole.ports.is_plain:
@@ -176,7 +179,7 @@ class Prediction:
     def of_joint(
         self, vector: ParameterVector, values: FloatArray, lines: NDArray[np.intp]
     ) -> Callable[[FloatArray], ComplexArray]:
-        """Return the FRFs of some lines as a function of values of which only those of the joint change."""
+        """Return the FRFs of some lines as a function of values, of which only values of the joint change."""
         link, states = self._parts(vector, values)
         free, to_out, to_in, between = (part[lines] for part in self._open(link, states)[1:])
         omega, own, gains = self.omega[lines], vector.places_of("joint"), self._gains(vector, values)
@@ -217,16 +220,16 @@ class Prediction:
 
     @property
     def has_noisy_parts(self) -> bool:
-        """Whether a substructure is given by FRFs that are not exact."""
+        """Whether FRFs that are not exact define a substructure."""
         return any(side.noise is not None for side in self.sides)
 
     def part_noise(self, vector: ParameterVector, values: FloatArray) -> ComplexArray | None:
-        """Return what noise of FRFs of the substructures does to those of the assembly; None where they are exact.
+        """Return the effect of noise of FRFs of the substructures on FRFs of the assembly; None if they are exact.
 
         Returns
         -------
         ndarray, shape (n_freq, n_o, n_i, n_sources)
-            By each of the independent errors, of its standard deviation; to first order, m/N.
+            Effect of each independent error of one standard deviation; to first order, m/N.
         """
         link, states = self._parts(vector, values)
         opened, gains, found, first = self._open(link, states), self._gains(vector, values), [], 0
@@ -269,15 +272,15 @@ class Prediction:
         Returns
         -------
         tuple of ndarray, shapes (n_freq, n_o, n) and (n_freq, n, n_i)
-            Without gains; the derivative of the FRFs by K*_dd is minus the product of both for DOF d. Of joints on
-            regions n counts the coefficients of the motion there.
+            Motions without gains; the derivative of the FRFs by K*_dd is minus the product of both for DOF d. For
+            joints on regions n counts the coefficients of the motion of the region.
         """
         n = len(self.whole.ports.dof)
         coupled = self._coupled(*self._parts(vector, values))
         return coupled.across_out[:, :, :n], coupled.across_in[:, :n]
 
     def refine(self, vector: ParameterVector, values: FloatArray) -> bool:
-        """Return whether a basis had to be extended to be good for these values."""
+        """Return whether a basis had to be extended for these values."""
         done = [side.refine(self._of_side(vector, values, side.name)) for side in self.sides]
         return any(done)
 
@@ -285,7 +288,7 @@ class Prediction:
         return {str(vector.all[i].place[1]): float(values[i]) for i in vector.places_of_part(name)}
 
     def away_from_joints(self, name: str) -> list[int]:
-        """Return the numbers of those DOFs of a substructure that no joint and no attachment touches."""
+        """Return the numbers of DOFs of a substructure without a joint and an attachment."""
         attached = itertools.chain(*(one.places for one in self.whole.attachments))
         taken = {*itertools.chain(*self.whole.ports.ends), *attached}
         return [i for i, dof in enumerate(self.places.of[name]) if f"{name}/{dof}" not in taken]
@@ -307,7 +310,7 @@ class Prediction:
         return link, tuple(states)
 
     def _open(self, link: Connection, states: tuple[SubstructureState, ...]) -> _Open:
-        """Return the FRFs before the substructures are connected; those of the same states are kept."""
+        """Return the FRFs before the substructures are connected; the last result is cached."""
         if self._last is None or any(one is not other for one, other in zip(self._last[0], states, strict=True)):
             h, e = _together(states), link.pattern
             across = motions_across(h, e)
@@ -342,7 +345,7 @@ class Prediction:
     def _joint_slopes(
         self, vector: ParameterVector, values: FloatArray, coupled: _Coupled, slopes: ComplexArray
     ) -> None:
-        """Put the derivatives by joint and attachments into their places."""
+        """Write the derivatives by joint and attachments into their places."""
         own = vector.places_of("joint")
         joint = self.whole.joint.with_values(values[own])
         changes = dict(zip(own, connection_entries(self.whole, joint, self.omega), strict=True))
@@ -378,7 +381,7 @@ class Prediction:
         parts: tuple[Connection, tuple[SubstructureState, ...]],
         slopes: ComplexArray,
     ) -> None:
-        """Put the derivatives by unknowns of the models into their places."""
+        """Write the derivatives by unknowns of the models into their places."""
         link, states = parts
         first, opened = 0, self._open(link, states)
         for side, state in zip(self.sides, states, strict=True):
@@ -400,7 +403,7 @@ class Prediction:
                     slopes[i] += out @ (slope.ports @ right)
                     slopes[i] += (left @ slope.ports.T) @ into
             if errors and side.errors is not None:
-                # Errors are changes of the matrices before these are scaled.
+                # Errors are changes of the matrices before scaling.
                 of_k, of_m = side.scales(numbers)
                 slopes[errors] = side.errors.slopes(
                     state.shapes, (1 + 1j * state.matrices.eta) * of_k, of_m * self.omega**2, left, right
@@ -432,7 +435,7 @@ def _together(states: tuple[SubstructureState, ...]) -> ComplexArray:
 
 
 def _weights(variance: FloatArray, axis: int) -> FloatArray:
-    """Return 1 over the standard deviation of rows or columns, 0 where all is zero; the mean's axis is kept."""
+    """Return 1 over the standard deviation of rows or columns, 0 if all entries are zero; the axis is kept."""
     mean = variance.mean(axis=axis, keepdims=True)
     found: FloatArray = np.where(mean > 0, 1 / np.sqrt(np.where(mean > 0, mean, 1)), 0)
     return found
@@ -463,7 +466,7 @@ def _times(left: ComplexArray, matrix: FloatArray) -> ComplexArray:
     return found.reshape(left.shape)
 
 
-#: Where the search for a spread begins: mounts of one kind differ by as much.
+#: Initial value of the search for a spread: the typical difference of mounts of one kind.
 _FIRST_SPREAD = 0.3
 #: Units of unknowns of models by their usual names.
 _UNITS = {
@@ -478,22 +481,23 @@ def parameter_vector(
     fixed: Sequence[str],
     joint_stiffness: FloatArray,
 ) -> ParameterVector:
-    """Put all parameters of an assembly and its channels together.
+    """Return all parameters of an assembly and its channels as a vector.
 
     Parameters
     ----------
     whole : Assembly
+        Assembly.
     gains : pair of mappings of int to (str, Unknown)
         Factors of responses and of forces, by the number of the channel: its name and factor.
     fixed : sequence of str
         Parameters of the joint that keep their value.
     joint_stiffness : ndarray, shape (n,)
-        Dynamic stiffness that the substructures have at the joint DOFs: stiffnesses of the joint are sought around it.
+        Dynamic stiffness of the substructures at the joint DOFs, N/m: the scale of the stiffnesses of the joint.
 
     Raises
     ------
     ValueError
-        `fixed` names what is no parameter of the joint.
+        `fixed` names a parameter that the joint does not have.
     """
     found = with_dampers(joint_vector(whole.joint, fixed, joint_stiffness).all, whole.joint)
     means = _with_means(whole, found)
@@ -502,7 +506,7 @@ def parameter_vector(
             lower, upper = range_of(part, name, unknown)
             unit = "1" if name in part.scaled and unknown.value == 1 else _UNITS.get(name, "")
             own = _of_unknown(f"{side}/{name}", unit, "part", (side, name), unknown)
-            # There is no structure without stiffness or mass.
+            # A structure without stiffness or mass does not exist.
             is_factor = name in part.scaled and name != "loss_factor"
             found.append(own._replace(lower=max(lower, 0.0) if is_factor else lower, upper=upper, is_log=is_factor))
     _with_same(whole, found)
@@ -516,7 +520,7 @@ def parameter_vector(
 
 
 def _with_same(whole: Assembly, parameters: list[FitParameter]) -> None:
-    """Let parameters of joints and parts that are the same equal those of the first one."""
+    """Make parameters of joints and parts that are the same equal to the parameters of the first one."""
     at = {one.name: i for i, one in enumerate(parameters)}
     for first, *others in whole.same:
         sign = "." if first in whole.joints else "/"
@@ -529,7 +533,7 @@ def _with_same(whole: Assembly, parameters: list[FitParameter]) -> None:
 
 
 def _with_means(whole: Assembly, parameters: list[FitParameter]) -> tuple[CommonMean, ...]:
-    """Add the common means of parameters of joints that are alike; return what these have in common."""
+    """Add the common means of parameters of similar joints; return these means."""
     at = {one.name: i for i, one in enumerate(parameters)}
     found = []
     for group, alike in whole.alike.items():

@@ -1,4 +1,4 @@
-"""What `identify_model` is given, checked and put into a problem."""
+"""Checked arguments of `identify_model`, as a problem."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from jointfrf.laws.law_joint import LawJoint
 
 __all__ = ["Channels", "JointStart", "prepare_model_fit"]
 
-#: Returns values of a joint from frequencies, FRFs between all its DOFs and their variance, or None.
+#: Function that returns values of a joint from frequencies, FRFs between all its DOFs and their variance, or None.
 JointStart = Callable[[LawJoint, FloatArray, ComplexArray, FloatArray], FloatArray | None]
 
 
@@ -71,9 +71,9 @@ def prepare_model_fit(
     fixed: Sequence[str],
     start: JointStart | None = None,
 ) -> ModelProblem:
-    """Check the arguments of a fit, find the noise, reduce the models; as in `identify_model`.
+    """Check the arguments of a fit, estimate the noise, reduce the models; see `identify_model`.
 
-    `start` returns values of a joint from FRFs between all its DOFs with their variance; None where it finds none.
+    `start` returns values of a joint from FRFs between all its DOFs with their variance; None if it finds none.
     """
     lines = as_lines("h", h)
     freq = as_frequency(freq_hz, len(lines))
@@ -133,14 +133,14 @@ def _shown(lines: ComplexArray, freq: FloatArray) -> NDArray[np.bool_]:
             "all lines)"
         )
     if never.all():
-        raise ValueError("h holds no FRF: all are NaN")
+        raise ValueError("h contains no FRF: all are NaN")
     return ~never
 
 
 def _joint_channels(
     whole: Assembly, channels: Channels, shown: NDArray[np.bool_]
 ) -> tuple[list[int], list[int]] | None:
-    """Return the channels at the DOFs j, then k, of the only joint where all FRFs between them were measured."""
+    """Return the channels at the DOFs j, then k, of the only joint with all FRFs between them measured."""
     names = [*whole.ends[0], *whole.ends[1]]
     if len(whole.joints) > 1 or not all(name in channels.responses and name in channels.forces for name in names):
         return None

@@ -19,11 +19,11 @@ from jointfrf.laws.law_joint import LawJoint
 
 __all__ = ["RealisationFits"]
 
-#: A minimum is found by a step that promised to lower the squares by less than this: the next would by far less.
+#: Predicted decrease of the squares by the last step: the next step would predict far less.
 _LEAST = 1e-2
-#: Steps of a set that is like the first: two or three.
+#: Usual number of steps for a set that is similar to the first: two or three.
 _STEPS = 6
-#: A set whose noise exceeds that of the first by this factor gets starts of its own.
+#: Ratio of the noise of a set to the noise of the first above which it needs separate initial values.
 _LIKE = 1.1
 
 
@@ -33,17 +33,19 @@ class RealisationFits:
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     whole : Assembly
+        Assembly with its unknowns.
     channels : Channels
+        Channels of the FRFs.
     first : iterable of ndarray, shape (n_freq, n_o, n_i)
-        Sets as `identify_model` takes them, all FRFs measured, m/N: all begin at the first whose residual is noise.
+        Sets of FRFs for `identify_model`, all measured, m/N: all start from the first whose residual is noise.
 
     Notes
     -----
-    The set to begin with is fitted as by `identify_model`. Noise of the others, relative part and floor by entry, is
-    found from measured minus fitted FRFs in place of smooth ones. Each minimum is its own; a set that comes to another
-    noise, or does not converge, is fitted as the first.
+    The first set is fitted by `identify_model`. Noise of all further sets, relative part and floor by entry, is
+    estimated from measured minus fitted FRFs instead of smooth ones. Each has its own minimum. A set with different
+    noise, or without convergence, is fitted like the first.
     """
 
     def __init__(self, freq_hz: FloatArray, whole: Assembly, channels: Channels, first: Iterable[ComplexArray]) -> None:
@@ -73,7 +75,7 @@ def _joint_of(problem: ModelProblem, values: FloatArray) -> LawJoint:
 
 
 class _Start:
-    """A minimum from which other sets are fitted."""
+    """A minimum from which further sets are fitted."""
 
     def __init__(self, problem: ModelProblem, x: FloatArray) -> None:
         self._problem, self._x = problem, x
@@ -82,7 +84,7 @@ class _Start:
         self._level = self._noise(problem.measured, self._y)[1]
 
     def joint(self, h: ComplexArray) -> LawJoint | None:
-        """Return the joint of the minimum near to that of other FRFs, None where the noise is not like theirs."""
+        """Return the joint of the nearest minimum for other FRFs, None if their noise differs."""
         problem, vector, x = self._problem, self._problem.vector, self._x
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             for turn in range(_STEPS):
@@ -107,7 +109,7 @@ class _Start:
             return self._problem.prediction.linearised(self._problem.vector, self._problem.vector.to_values(x))
 
     def _noise(self, h: ComplexArray, y: ComplexArray) -> tuple[FloatArray, float]:
-        """Return E|e|^2 of FRFs about fitted ones, inf where nothing is measured, and its median level."""
+        """Return E|e|^2 of FRFs about fitted ones, inf if nothing was measured, and its median level."""
         used = np.isfinite(self._problem.variance).all(axis=0)
         squares, size = (np.asarray((abs(part[:, used]) ** 2).T, float, "C") for part in (h - y, y))
         freq, model = self._problem.freq_hz, self._problem.noise.model

@@ -21,25 +21,25 @@ from jointfrf.models.model import Model
 
 __all__ = ["MatrixPolynomial", "ReducedSlope", "ReducedSubstructure", "SubstructureState", "range_of"]
 
-#: The basis is good beyond the band of the measurement by this share, for models that are stiffer or lighter.
+#: Share of the band beyond its end up to which the basis is accurate, for models that are stiffer or lighter.
 _MARGIN = 0.15
-#: Tolerance of a reduction, and what its FRFs may differ from those of the model for other values of the unknowns.
+#: Tolerance of a reduction, and tolerance of its FRFs for other values of the unknowns.
 _TOLERANCE, _ALLOWED = 1e-8, 1e-4
-#: A direction smaller than this share of its vector is not new.
+#: Relative size of a direction below which it is not new.
 _NEW = 1e-9
-#: Unknowns of a function vary by so many standard deviations for the basis and for the polynomials of the matrices, by
-#: this share of their value where there is no prior; and may be found within a larger range.
+#: Range of unknowns of a function for the basis and for the polynomials of the matrices, in standard deviations, or as
+#: a share of their value without a prior; the last value is the range of the search.
 _REACH, _SHARE, _RANGE = 2.5, 0.06, 2.0
 #: A modal damping matrix is diagonal if no other entry exceeds this share of it.
 _DIAGONAL = 1e-10
-#: Lines at which a reduced model is compared with the model.
+#: Number of lines at which a reduced model is compared with the model.
 _SPOTS = 2
-#: In a model of this many DOFs a direct solution costs as much as an iteration: one line.
+#: Number of DOFs of a model for which a direct solution costs as much as an iteration: one line.
 _LARGE = 3000
 
 
 class _Matrices(NamedTuple):
-    """Matrices in the basis, shape (r, r), and what the ports see of it, shape (m, r)."""
+    """Matrices in the basis, shape (r, r), and motion of the ports in it, shape (m, r)."""
 
     k: FloatArray
     m: FloatArray
@@ -50,14 +50,16 @@ class _Matrices(NamedTuple):
 
 
 class ReducedSlope(NamedTuple):
-    """Derivatives by one unknown, in modal coordinates; None for what does not change, shape (r,) for a diagonal.
+    """Derivatives by one unknown, in modal coordinates; None if zero, shape (r,) for a diagonal.
 
     Attributes
     ----------
     k, m, c, h : ndarray or None
+        Derivatives of the matrices.
     eta : ndarray, shape (r,), or None
-        The stiffness that the loss factor multiplies, where it is the unknown.
+        Stiffness that the loss factor multiplies, if the loss factor is the unknown.
     ports : ndarray, shape (m, r), or None
+        Derivatives of the motion of the ports.
     """
 
     k: FloatArray | None = None
@@ -74,13 +76,13 @@ class SubstructureState(NamedTuple):
     Attributes
     ----------
     h : ndarray, shape (n_freq, m, m)
-        m/N; 0 for those that are not asked for.
+        Receptances, m/N; 0 for those that are not requested.
     x : ndarray, shape (n_freq, m, r)
-        P Z^-1: modal coordinates by forces at the ports; r = 0 for FRFs.
+        Product P Z^-1: modal coordinates by forces at the ports; r = 0 for FRFs.
     matrices : _Matrices or None
-        What its derivatives come from.
+        Matrices from which its derivatives follow.
     squared : ndarray, shape (r,)
-        w_r^2 of the modes.
+        Squared natural frequencies w_r^2, rad^2/s^2.
     shapes : ndarray, shape (r, r)
         Modes in the basis.
     """
@@ -93,18 +95,18 @@ class SubstructureState(NamedTuple):
 
 
 def reach_of(unknown: Unknown) -> float:
-    """Return how far an argument of a function that builds a model is varied from its believed value."""
+    """Return the range of an argument of a function that builds a model about its nominal value."""
     return _REACH * unknown.std if unknown.std is not None else _SHARE * max(abs(unknown.value), 1e-9)
 
 
 def _box(unknown: Unknown, centre: float, share: float = 1.0) -> tuple[float, float]:
-    """Return the limits of an argument about a value, within its own: a function may raise an error beyond them."""
+    """Return limits of an argument about a value, within its bounds: a function may raise an error beyond them."""
     reach = share * reach_of(unknown)
     return max(unknown.lower, centre - reach), min(unknown.upper, centre + reach)
 
 
 def range_of(part: Substructure, name: str, unknown: Unknown) -> tuple[float, float]:
-    """Return the limits within which an unknown of a substructure is sought."""
+    """Return the limits of the search for an unknown of a substructure."""
     if name in part.scaled:
         return unknown.lower, unknown.upper
     widest = _RANGE * reach_of(unknown)
@@ -117,13 +119,15 @@ class ReducedSubstructure:
     Parameters
     ----------
     name : str
-        "A" or "B", for messages.
+        Name for messages, "A" or "B".
     part : Substructure
+        Substructure to reduce.
     freq_hz : ndarray, shape (n_freq,)
+        Frequencies, Hz.
     dofs : sequence of str, length m
+        DOFs of its FRFs.
     between : sequence of str, optional
-        Those of which at least one is in each FRF that is asked for: the model is reduced for forces there. All by
-        default.
+        DOFs of which each requested FRF has at least one: the model is reduced for forces there. All by default.
     """
 
     def __init__(
@@ -158,7 +162,7 @@ class ReducedSubstructure:
         return [name for name in self.part.fitted if name not in self.part.scaled]
 
     def _trials(self) -> list[dict[str, float]]:
-        """Values for which the basis must be good: those believed, and where geometry changes, others around."""
+        """Values for which the basis must be accurate: nominal ones, and if geometry changes, others around."""
         trials: list[dict[str, float]] = [{}]
         if not isinstance(self.part.source, Model):
             for name, unknown in self.part.unknowns.items():
@@ -166,7 +170,7 @@ class ReducedSubstructure:
         return trials
 
     def _space(self, trials: Sequence[Mapping[str, float]]) -> FloatArray:
-        """Return a basis of all motions of the models for some values, orthonormal but for the scale of each DOF."""
+        """Return a basis of the motions of the models for some values, orthonormal up to the scale of each DOF."""
         n = len(self.part.nominal_model.dofs)
         if n <= len(self.dofs):  # nothing is left to reduce
             return np.eye(n)
@@ -206,7 +210,7 @@ class ReducedSubstructure:
         )
 
     def _unscaled(self, values: Mapping[str, float]) -> _Matrices:
-        """Return the reduced matrices for those unknowns that are arguments of a function."""
+        """Return the reduced matrices for unknowns that are arguments of a function."""
         arguments = [values[name] for name in self._arguments]
         if arguments:
             if self._polynomial is None:
@@ -217,7 +221,7 @@ class ReducedSubstructure:
         return self._nominal
 
     def _scaled(self, own: _Matrices, values: Mapping[str, float]) -> _Matrices:
-        """Return the matrices with those unknowns that are factors of them."""
+        """Return the matrices with unknowns that are factors of them."""
         for name, unknown in self.part.scaled.items():
             factor = values.get(name, unknown.value) / unknown.value
             if name == "youngs_modulus":
@@ -229,7 +233,7 @@ class ReducedSubstructure:
         return own
 
     def allow_errors(self, most: int, at: Sequence[int] = ()) -> None:
-        """Let modal matrices, and mode shapes at some DOFs, be off by at most so many terms each, from now on."""
+        """Add errors of modal matrices, and of mode shapes at some DOFs, with at most so many terms each."""
         if not isinstance(self.part.source, FrfSource):
             own = self._unscaled(self.part.nominal)
             self.errors = ModalErrors(own.k, own.m, float(self.omega.max()), most, own.ports, at)
@@ -237,7 +241,7 @@ class ReducedSubstructure:
     def at(
         self, values: Mapping[str, float], errors: FloatArray | None = None, of_shapes: FloatArray | None = None
     ) -> SubstructureState:
-        """Return the FRFs for values of all unknowns, and of the terms of `errors` where there are any."""
+        """Return the FRFs for values of all unknowns, and of the terms of `errors` if there are any."""
         given = [one if one is not None and self.errors is not None else np.zeros(0) for one in (errors, of_shapes)]
         key = (*values.values(), *given[0].tolist())
         if given[1].size:
@@ -332,7 +336,7 @@ class ReducedSubstructure:
         return MatrixPolynomial(build, box.mean(axis=1), reach)
 
     def _of_arrays(self, arrays: Sequence[FloatArray]) -> _Matrices:
-        """Return matrices from those arrays that the model has."""
+        """Return matrices from the arrays of the model."""
         left = list(arrays)
         model = self.part.nominal_model
         k, m = left.pop(0), left.pop(0)
@@ -375,7 +379,7 @@ def _diagonal(matrix: Any) -> FloatArray:
 
 #: Total degree of polynomials of one, two or three numbers, and of more.
 _DEGREE, _DEGREE_OF_MANY = 5, 3
-#: Points for each coefficient.
+#: Number of points for each coefficient.
 _POINTS = 1.6
 
 
@@ -385,13 +389,13 @@ class MatrixPolynomial:
     Parameters
     ----------
     build : callable
-        ``build(values)`` returns arrays whose shapes do not change; `values` has shape (u,).
+        Function ``build(values)`` that returns arrays of constant shapes; `values` has shape (u,).
     centre, reach : ndarray, shape (u,)
         Middle of the box in which the polynomials are made, and half of its sides, positive.
 
     Notes
     -----
-    Of a matrix that goes with the third power of a length, the error is about 1e-8 for a reach of 5 %.
+    If a matrix is proportional to the third power of a length, the error is about 1e-8 for a reach of 5 %.
     """
 
     def __init__(
@@ -436,6 +440,6 @@ class MatrixPolynomial:
         return self._arrays(self._terms((values - self.centre) / self.reach) @ self.coefficients)
 
     def slope(self, values: FloatArray, i: int) -> list[FloatArray]:
-        """Return their derivatives by one of the numbers."""
+        """Return the derivatives of the arrays by one of the numbers."""
         terms = self._terms((values - self.centre) / self.reach, i) / self.reach[i]
         return self._arrays(terms @ self.coefficients)

@@ -1,4 +1,4 @@
-"""Values from which a fit of a model starts: the best of many trials."""
+"""Initial values of a fit of a model: the best of many trials."""
 
 from __future__ import annotations
 
@@ -13,30 +13,31 @@ from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["ranked_trials", "refined"]
 
-#: Trials, lines at which they are compared, and how many of the best are refined.
+#: Number of trials, number of lines at which they are compared, and number of the best that are refined.
 _TRIALS, _LINES, _BEST = 200, 60, 5
-#: Trials are drawn from this seed: the same data give the same fit.
+#: Seed of the trials: the same data give the same fit.
 _SEED = 1
-#: Stiffnesses of trials lie within this factor of that of the substructures.
+#: Largest ratio of stiffnesses of trials to the stiffness of the substructures.
 _SPREAD = 3e3
-#: Standard deviation of a logarithm of an FRF that is not yet fitted, and where a misfit counts no further.
+#: Standard deviation of a logarithm of an FRF that is not yet fitted, and the misfit at which it is clipped.
 _BROAD, _CUT = 0.3, 3.0
 
 
 def ranked_trials(likelihood: Likelihood, given: Sequence[FloatArray]) -> list[FloatArray]:
-    """Return values of all parameters from which to start, best first.
+    """Return initial values of all parameters, best first.
 
     Parameters
     ----------
     likelihood : Likelihood
+        Objective.
     given : sequence of ndarray
-        Values of all parameters that are tried, too.
+        Further values of all parameters to try.
 
     Notes
     -----
-    Parameters of the joint are drawn over decades around the stiffness that the substructures have at the joint; the
-    rest keeps its believed values. They are ranked by |ln(measured / predicted)|, cut so that resonances that lie apart
-    do not hide those that agree.
+    Parameters of the joint are drawn over decades around the stiffness of the substructures at the joint; all further
+    parameters keep their nominal values. The trials are ranked by |ln(measured / predicted)|, limited so that distant
+    resonances do not hide resonances that agree.
     """
     vector, prediction = likelihood.vector, likelihood.prediction
     n_freq = len(prediction.freq_hz)
@@ -58,7 +59,7 @@ def ranked_trials(likelihood: Likelihood, given: Sequence[FloatArray]) -> list[F
 
 
 def _drawn(vector: ParameterVector, stiffness: FloatArray) -> list[FloatArray]:
-    """Return trials: stiffnesses over decades, damping that goes with them, times and numbers over their range."""
+    """Return trials: stiffnesses over decades, damping in proportion, times and numbers over their range."""
     generator = np.random.default_rng(_SEED)
     own = [i for i in vector.places_of("joint") if vector.all[i].is_free]
     trials = []
@@ -89,7 +90,7 @@ def refined(likelihood: Likelihood, trials: Sequence[FloatArray]) -> Iterator[Fl
     of_joint = LogLikelihood(likelihood.prediction, own, likelihood.measured, weight)
     found = list(trials[:1])
     if own.free.size:
-        apart = _apart(vector, trials)
+        apart = _distinct(vector, trials)
         minima = [minimise(of_joint, own.to_coordinates(values), steps=15, least=1e-2) for values in apart]
         found = [own.to_values(one.x) for one in sorted(minima, key=lambda one: one.cost)]
     for values in found:
@@ -97,7 +98,7 @@ def refined(likelihood: Likelihood, trials: Sequence[FloatArray]) -> Iterator[Fl
         yield x if own.free.size == vector.free.size else minimise(broad, x, steps=15, least=1e-2).x
 
 
-def _apart(vector: ParameterVector, trials: Sequence[FloatArray]) -> list[FloatArray]:
+def _distinct(vector: ParameterVector, trials: Sequence[FloatArray]) -> list[FloatArray]:
     """Return the best trials that are not near to a better one."""
     kept: list[FloatArray] = []
     logs: list[FloatArray] = []

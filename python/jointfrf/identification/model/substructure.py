@@ -1,4 +1,4 @@
-"""A substructure as a fit takes it: a model, a function that builds one, or FRFs; with what is unknown of it."""
+"""A substructure of a fit: a model, a function that builds one, or FRFs; with its unknowns."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ __all__ = ["FrfSource", "Substructure", "Unknown"]
 
 @dataclass(frozen=True)
 class Unknown:
-    """A number of a model that is not known exactly: it is fitted with the joint.
+    """A number of a model that is not known exactly and is fitted with the joint.
 
     Parameters
     ----------
     value : float
-        What is believed before the measurement, in the unit of the number.
+        Nominal value and initial value, in the unit of the number.
     std : float, optional
-        Standard deviation of that belief, a normal prior; none by default: only the FRFs determine it.
+        Standard deviation of a normal prior about the value; by default only the FRFs determine it.
     lower, upper : float
-        Limits.
+        Bounds; none by default.
 
     Raises
     ------
@@ -73,15 +73,15 @@ class Unknown:
             raise ValueError(f"value must lie in {self.lower:g} to {self.upper:g}, not {self.value:g}")
 
 
-#: Relative standard deviations of what no model knows exactly: Young's modulus, density.
+#: Relative prior standard deviations of every model: Young's modulus, density.
 _NEVER_EXACT = {"youngs_modulus": 0.03, "density": 0.01}
-#: Relative standard deviation of each modal stiffness and mass of a model, beside what its unknowns describe.
+#: Relative standard deviation of each modal stiffness and mass of a model, in addition to its unknowns.
 _MODEL_ERROR = 0.005
-#: Above this a model does not describe its part.
+#: Error above which a model does not describe its part.
 _LARGEST_ERROR = 0.1
 #: Relative noise below this is rounding.
 _LEAST_LEVEL = 1e-7
-#: What a model's own matrices may be scaled by, and its loss factor.
+#: Factors of the matrices of a model, and its loss factor.
 SCALES = ("youngs_modulus", "density", "loss_factor")
 
 
@@ -92,11 +92,13 @@ class FrfSource:
     Attributes
     ----------
     freq_hz : ndarray, shape (n_freq,)
+        Frequencies, Hz.
     h : ndarray, shape (n_freq, m, m)
-        m/N.
+        Receptances, m/N.
     dofs : tuple of str, length m
+        Names of the DOFs.
     noise : float or ndarray, shape (n_freq, m, m), optional
-        Relative level, or E|e|^2 of each FRF, (m/N)^2; 0 where they are exact. By default it is found from the FRFs.
+        Relative level, or E|e|^2 of each FRF, (m/N)^2; 0 if they are exact. By default it is estimated from the FRFs.
     """
 
     freq_hz: FloatArray
@@ -106,13 +108,13 @@ class FrfSource:
 
     @cached_property
     def variance(self) -> FloatArray | None:
-        """E|e|^2 times the lines that carry the noise of one independent line; None where the FRFs are exact."""
+        """E|e|^2 times the number of lines with the noise of one independent line; None if the FRFs are exact."""
         if isinstance(self.noise, np.ndarray):
             return self.noise if self.noise.any() else None
         if self.noise is not None:
             return np.asarray(self.noise**2 * abs(self.h) ** 2, np.float64) if self.noise else None
         found = estimate_noise(self.freq_hz, self.h)
-        # What a rational function leaves of FRFs that it does not meet is no noise.
+        # The residual of a rational function that does not fit is no noise.
         is_seen = found.source == "reciprocity" or (found.source == "residual" and found.smooth.is_smooth)
         if not is_seen or found.level < _LEAST_LEVEL:
             return None
@@ -126,7 +128,7 @@ class FrfSource:
 
 @dataclass(frozen=True)
 class Substructure:
-    """A substructure: a model with what is not known of it, or FRFs.
+    """A substructure: a model with its unknowns, or FRFs.
 
     Parameters
     ----------
@@ -134,17 +136,17 @@ class Substructure:
         A model; a function that builds one from the values of `unknowns` by name, ``build(length=0.3)``; or FRFs, see
         `of_frfs`.
     joint : sequence of str
-        Names of its joint DOFs, in the order of the joint; of two parts and one joint only.
+        Names of its joint DOFs, in the order of the joint; only for two parts and one joint.
     unknowns : mapping of str to Unknown
-        Of a `Model`: ``"youngs_modulus"`` scales K and H, ``"density"`` scales M, ``"loss_factor"`` is its eta. Of a
-        function: its arguments.
+        Unknowns by name, none by default. For a `Model`: ``"youngs_modulus"`` scales K and H, ``"density"`` scales M,
+        ``"loss_factor"`` is its eta. For a function: its arguments.
     exact : bool
-        Whether nothing else of a model is unknown, except its `model_error` if one is given. By default none is exact:
-        Young's modulus and density, where they are not among the unknowns, are fitted as factors of K and M under
-        priors of 3 % and 1 %, the coefficients of variation of structural steel [1]_.
+        Whether a model has no further unknowns, except its `model_error` if one is given; default False. Young's
+        modulus and density that are not among the unknowns are then fitted as factors of K and M. Their priors are 3 %
+        and 1 %, the coefficients of variation of structural steel [1]_.
     model_error : float, optional
-        Relative standard deviation of each modal stiffness and mass of the free substructure that is believed beside
-        what its unknowns describe: mesh, clamps, small masses. 0.005 by default, and 0 if it is exact.
+        Prior relative standard deviation of each modal stiffness and mass of the free substructure, in addition to its
+        unknowns: mesh, clamps, small masses. Default 0.005, and 0 if it is exact.
 
     References
     ----------
@@ -155,6 +157,11 @@ class Substructure:
     ------
     ValueError
         An unknown that the source does not have; unknowns or errors of FRFs; an error that is negative or above 0.1.
+
+    See Also
+    --------
+    Assembly : assembly of substructures and joints.
+    Unknown : value and prior of an unknown.
 
     Examples
     --------
@@ -215,16 +222,16 @@ class Substructure:
         Parameters
         ----------
         freq_hz : array_like, shape (n_freq,)
-            The lines of the measurement of the assembly, Hz.
+            Lines of the measurement of the assembly, Hz.
         h : array_like, shape (n_freq, m, m)
-            Receptances between its joint DOFs and the points measured, m/N.
+            Receptances between its joint DOFs and the measured points, m/N.
         dofs : sequence of str, length m
-            Their names.
+            Names of the DOFs.
         joint : sequence of str
-            Which of them are the joint DOFs.
+            Names of the joint DOFs among them.
         noise : float or array_like, shape of h, optional
-            Relative noise of these FRFs, or E|e|^2 of each, (m/N)^2; 0 where they are exact. By default it is found, as
-            `estimate_noise` does: computed FRFs show none. It is in the weights and intervals of `identify_model`.
+            Relative noise of these FRFs, or E|e|^2 of each, (m/N)^2; 0 if they are exact. By default `estimate_noise`
+            estimates it; computed FRFs have none. Weights and intervals of `identify_model` include it.
 
         Raises
         ------
@@ -241,12 +248,12 @@ class Substructure:
         if noise is not None:
             level = as_not_negative("noise", noise) if np.ndim(noise) == 0 else as_real("noise", noise, lines.shape)
             if np.min(level) < 0:
-                raise ValueError("noise must hold variances E|e|^2 of each FRF, none below 0")
+                raise ValueError("noise must be variances E|e|^2 of each FRF, none below 0")
         return cls(FrfSource(freq, lines, names, level), as_names("joint", joint))
 
     @cached_property
     def fitted(self) -> dict[str, Unknown]:
-        """The unknowns, and those that every model has unless it is exact."""
+        """The unknowns, including the unknowns of every model that is not exact."""
         if self.exact or isinstance(self.source, FrfSource):
             return dict(self.unknowns)
         errors = {name: Unknown(1.0, std, 0.0) for name, std in _NEVER_EXACT.items() if name not in self.unknowns}
@@ -259,34 +266,34 @@ class Substructure:
 
     @property
     def error_level(self) -> float:
-        """Relative standard deviation of its modal stiffnesses and masses beside its unknowns."""
+        """Relative standard deviation of its modal stiffnesses and masses in addition to its unknowns."""
         if self.model_error is None:
             return 0.0 if self.exact or isinstance(self.source, FrfSource) else _MODEL_ERROR
         return self.model_error
 
     @cached_property
     def scaled(self) -> dict[str, Unknown]:
-        """Those of `fitted` that are factors of the matrices, or their loss factor."""
+        """Unknowns that are factors of the matrices, or their loss factor."""
         is_model = isinstance(self.source, Model)
         return {name: one for name, one in self.fitted.items() if is_model or name not in self.unknowns}
 
     @property
     def nominal(self) -> dict[str, float]:
-        """Values of all that is fitted, as believed."""
+        """Nominal values of all unknowns."""
         return {name: unknown.value for name, unknown in self.fitted.items()}
 
     @cached_property
     def nominal_model(self) -> Model:
-        """The model for the values believed."""
+        """Model for the nominal values."""
         return self.model()
 
     def model(self, values: Mapping[str, float] | None = None) -> Model:
-        """Return the model for values of its unknowns, those believed by default.
+        """Return the model for values of its unknowns, by default the nominal ones.
 
         Raises
         ------
         TypeError
-            It is given by FRFs, or the function returns no model.
+            The substructure is given by FRFs, or the function returns no model.
         """
         if not isinstance(values, Mapping | None):
             raise TypeError(f"values must be a mapping of names to numbers, not {type(values).__name__}")
@@ -323,17 +330,17 @@ class Substructure:
         return True
 
     def region(self, dof: str) -> Region | None:
-        """Return the region of which ``"edge:z"`` is the motion; None of other DOFs."""
+        """Return the region whose motion ``"edge:z"`` is; None for other DOFs."""
         return self.nominal_model.regions[dof.rpartition(":")[0]] if self.region_ports(dof) else None  # type: ignore[attr-defined]
 
     def region_ports(self, dof: str) -> tuple[str, ...]:
-        """Return the coefficients of the motion of a region; none of other DOFs."""
+        """Return the coefficients of the motion of a region; none for other DOFs."""
         if isinstance(self.source, FrfSource) or not isinstance(self.nominal_model, PointModel):
             return ()
         return self.nominal_model.region_ports(dof)
 
     def receptance(self, freq_hz: FloatArray, dofs: Sequence[str]) -> ComplexArray:
-        """Return the receptances between DOFs as believed, shape (n_freq, m, m), m/N."""
+        """Return the nominal receptances between DOFs, shape (n_freq, m, m), m/N."""
         if isinstance(self.source, FrfSource):
             at = [self.source.dofs.index(dof) for dof in dofs]
             return self.source.h[:, at][:, :, at]

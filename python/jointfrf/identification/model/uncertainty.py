@@ -17,27 +17,27 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["BandHomogeneity", "ModelLinearised", "band_homogeneity"]
 
-#: Standard deviation of a logarithm, or of a value relative to the nominal one, above which it is not determined.
+#: Standard deviation of a logarithm, or of a value relative to its nominal value, above which it is not determined.
 _DETERMINED = 100.0
 
 
-#: Parts of a band without gaps, a gap in mean distances of lines, and lines of a part for each parameter.
+#: Number of parts of a band without gaps, least gap in mean distances of lines, and lines of a part for each parameter.
 _PARTS, _GAP, _LINES = 4, 10, 2
-#: Probability at which parts that differ are taken to differ by noise.
+#: Probability above which differences between parts are noise.
 _CHANCE = 1e-3
 
 
 class BandHomogeneity(NamedTuple):
-    """Whether parts of the band show the same parameters: a test of homogeneity.
+    """Test of homogeneity: whether parts of the band show the same parameters.
 
     Attributes
     ----------
     spans : tuple of (float, float)
-        Hz.
+        Parts of the band, Hz.
     steps : ndarray, shape (n_parts, p)
-        Coordinates by each part less those by all lines, by one Gauss-Newton step; NaN where a part shows none.
+        Coordinates by each part minus coordinates by all lines, by one Gauss-Newton step; NaN if undetermined.
     factor : ndarray, shape (p,)
-        By which variances grow until the interval covers the parts; 1 where chance explains the differences.
+        Factor of the variances so that the interval covers the parts; 1 if chance explains the differences.
     apart : ndarray of int, shape (p, 2)
         The two parts that differ most, relative to their standard errors, the one further from all lines first.
     """
@@ -50,22 +50,22 @@ class BandHomogeneity(NamedTuple):
 
 @dataclass(frozen=True)
 class ModelLinearised(Linearised):
-    """The likelihood of FRFs of an assembly about its minimum, in coordinates of the parameters that are shown.
+    """The likelihood of FRFs of an assembly about its minimum, in coordinates of the printed parameters.
 
     Attributes
     ----------
     n_freq, information, slope, priors, determined
-        As in `Linearised`.
+        Attributes of `Linearised`.
     inflation : float
-        Lines that carry the noise of one independent line: 1 over it is the mean square of a real residual.
+        Number of lines that carry the noise of one independent line; its inverse is the mean square of a real residual.
     slopes : ndarray, shape (p, n_freq, n_o, n_i)
         Derivatives of the weighted FRFs by the coordinates.
     residual : ndarray, shape (n_freq, n_o, n_i)
-        Weighted.
+        Weighted residual.
     of_errors : ndarray, shape (p, n_freq, n_o, n_i)
         Change of the gradient (its real part) by a relative error of 1 of each FRF.
     squares : ndarray, shape (n_freq, n_o, n_i)
-        Of the weighted residual that such an error leaves.
+        Squares of the weighted residual that such an error leaves.
     """
 
     n_freq: int
@@ -81,14 +81,14 @@ class ModelLinearised(Linearised):
 
     @classmethod
     def of(cls, likelihood: Likelihood, minimum: Minimum, inflation: float) -> ModelLinearised:
-        """Return the parts at a minimum of a likelihood; parameters that are not shown are eliminated."""
+        """Return the parts at a minimum of a likelihood; parameters that are not printed are eliminated."""
         vector, x, n = likelihood.vector, minimum.x, likelihood.vector.n_shown
         y, slopes = likelihood.prediction.linearised(vector, vector.to_values(x))
         whole = minimum.information
         kept = np.eye(n, x.size)
         if n < x.size:
             kept[:, n:] = -whole[:n, n:] @ inverse_information(whole[n:, n:])
-        # A prediction may lend its derivatives.
+        # A prediction may share its derivatives without a copy.
         slopes = np.tensordot(kept * vector.slope(x), slopes, 1)
         slopes = likelihood.weighted(slopes)
         pulled = kept @ vector.pull_slopes(x).T
@@ -109,7 +109,7 @@ class ModelLinearised(Linearised):
         return self._parts(1, which)
 
     def channels(self) -> Iterator[LineParts]:
-        """Yield the parts of all responses, then those of all forces, if there are several."""
+        """Yield the parts of all responses, then the parts of all forces, if there are several."""
         for axis in (2, 3):
             if self.slopes.shape[axis] > 1:
                 yield self._parts(axis)
@@ -130,21 +130,23 @@ class ModelLinearised(Linearised):
 
 
 def band_homogeneity(at: ModelLinearised, freq_hz: FloatArray, factor: FloatArray) -> BandHomogeneity:
-    """Compare parts of the band, each fitted by itself.
+    """Compare parts of the band, each fitted separately.
 
     Parameters
     ----------
     at : ModelLinearised
+        Likelihood about its minimum.
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequencies, Hz.
     factor : ndarray, shape (p,)
         Variance factors by the scatter between lines and blocks of lines.
 
     Notes
     -----
-    Parts are those between gaps of the lines, or quarters of the band. Squares of the differences from all lines, over
-    their variance, follow chi-squared if the parts agree. If they do not, the difference is an error of the models or
-    of the joint, which no number of parts averages out: the variance of the mean is no less than that of a part.
+    The parts are separated by gaps of the lines, or are quarters of the band. Squares of the differences from all
+    lines, over their variance, follow chi-squared if the parts agree. If they do not, the difference is an error of the
+    models or of the joint, which no number of parts averages out. The variance of the mean is then at least the
+    variance of a part.
     """
     order, p = np.argsort(freq_hz), len(at.slope)
     distance = np.diff(freq_hz[order])
