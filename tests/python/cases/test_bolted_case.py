@@ -19,16 +19,16 @@ import jointfrf as jf
 from jointfrf.dofs import DIRECTIONS, rigid_motion
 from jointfrf.workbench.cases import catalogue
 from jointfrf.workbench.cases.bolted_lap import frfs
+from jointfrf.workbench.cases.bolted_lap.contact import ContactLaw
 from jointfrf.workbench.cases.bolted_lap.frfs import resonance_errors, resonances
+from jointfrf.workbench.cases.bolted_lap.lap import LapDivisions, bolted_lap
+from jointfrf.workbench.cases.bolted_lap.preload import preload
 from jointfrf.workbench.cases.bolted_lap.results import build_summary, build_tables
 from jointfrf.workbench.cases.bolted_lap.routes import DOFS, FivePoints, both_sides, measured_entries
 from jointfrf.workbench.cases.catalogue import CaseOutput, find_case, read_case, run_case
 from jointfrf.workbench.cli import run
 from jointfrf.workbench.cli.main import main
 from jointfrf.workbench.report.draw import draw
-from jointfrf.workbench.solids.bolted_lap import LapDivisions, bolted_lap
-from jointfrf.workbench.solids.contact import ContactLaw
-from jointfrf.workbench.solids.preload import preload
 from thinned_cases import DrawSome
 
 FOLDER = find_case("4.3.3")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
+from jointfrf.workbench.cases.bolted_lap.contact import ContactInterface, ContactLaw, solve_contact
 from jointfrf.workbench.solids.brick import Material, assemble_bricks
-from jointfrf.workbench.solids.contact import ContactInterface, ContactLaw, solve_contact
 from jointfrf.workbench.solids.mesh import Mesh, extrude, rectangle
 
 RIGID = ContactLaw(0.3, None, None)

@@ -1,5 +1,8 @@
 """A lap joint with a preloaded bolt of solid elements: measured, identified, and used again with another beam.
 
+lap          the mesh of two beams and the bolt; the force of the preload
+contact      unilateral contact with friction between pairs of nodes
+preload      the tightened state, its contact pressure, the linear model about it
 keys         the keys of its files, and the case as data
 frfs         FRFs: of the preloaded solid model, of the beams by themselves; resonances of the tip
 routes       from measured FRFs to K*(w) by several routes, and to constants by two estimators

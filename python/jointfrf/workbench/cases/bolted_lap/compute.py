@@ -24,6 +24,7 @@ from jointfrf.workbench.cases.bolted_lap.frfs import (
     solid_frfs,
 )
 from jointfrf.workbench.cases.bolted_lap.keys import BoltedLapCase
+from jointfrf.workbench.cases.bolted_lap.preload import PreloadedLap
 from jointfrf.workbench.cases.bolted_lap.routes import (
     DOFS,
     FivePoints,
@@ -39,7 +40,6 @@ from jointfrf.workbench.cases.bolted_lap.routes import (
 from jointfrf.workbench.cases.keys import Noise, constant_joint
 from jointfrf.workbench.cases.kind import EstimateColumn, EstimateGroup, Estimates, StudyChoice, chosen_noises
 from jointfrf.workbench.cases.workers import Workers
-from jointfrf.workbench.solids.preload import PreloadedLap
 
 __all__ = [
     "LINES",

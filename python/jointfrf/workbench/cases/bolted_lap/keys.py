@@ -9,6 +9,7 @@ from jointfrf.dofs import Parameter
 from jointfrf.frf.bands import Band
 from jointfrf.joint import Joint
 from jointfrf.toml.declared import Keys, NotNegative, Positive, key
+from jointfrf.workbench.cases.bolted_lap.lap import PROOF_STRENGTH, STRESS_AREA, Bolt, lap_bricks, preload_force
 from jointfrf.workbench.cases.keys import (
     BandKeys,
     BandSet,
@@ -22,7 +23,6 @@ from jointfrf.workbench.cases.keys import (
     check_noises,
     joints_of,
 )
-from jointfrf.workbench.solids.bolted_lap import PROOF_STRENGTH, STRESS_AREA, Bolt, lap_bricks, preload_force
 from jointfrf.workbench.solids.brick_beam import Preset
 from jointfrf.workbench.structures.keys import MaterialKeys
 from jointfrf.workbench.structures.substructures import BRICK, PRESET

@@ -11,10 +11,10 @@ from scipy import sparse
 
 from jointfrf.dofs import DIRECTIONS
 from jointfrf.kernel.arguments import FloatArray, as_positive, check_type
-from jointfrf.workbench.solids.bolted_lap import INTERFACES, BoltedLap
+from jointfrf.workbench.cases.bolted_lap.contact import ContactLaw, InterfaceState, Iteration, Pairs, solve_contact, tie
+from jointfrf.workbench.cases.bolted_lap.lap import INTERFACES, BoltedLap
 from jointfrf.workbench.solids.brick import Formulation, assemble_bricks
 from jointfrf.workbench.solids.brick_beam import PRESETS
-from jointfrf.workbench.solids.contact import ContactLaw, InterfaceState, Iteration, Pairs, solve_contact, tie
 from jointfrf.workbench.solids.mesh import NEAR
 from jointfrf.workbench.solids.solid import SolidModel, solid_model
 
@@ -32,14 +32,14 @@ class PreloadedLap:
         Preload, N.
     law : ContactLaw
     elongation : float
-        By how much the two halves of the shank were drawn over each other at the cut, m: the stretch of the bolt and
-        the compression of what it clamps.
+        Length over which the two halves of the shank were drawn over each other at the cut, m: the stretch of the bolt
+        and the compression of the clamped parts.
     displacement : ndarray, shape (n_nodes, 3)
-        m. On the plane of the cut, that of the upper half of the shank.
+        m. On the plane of the cut: of the upper half of the shank.
     interfaces : dict of str to InterfaceState
         "head", "lap" and "nut", in the order of the pairs of `lap.interfaces`.
     history : tuple of Iteration
-        Of the contact; the last one agrees with its own contacts.
+        Iterations of the contact; the last one agrees with its own contacts.
     """
 
     lap: BoltedLap
@@ -70,10 +70,10 @@ class PreloadedLap:
 
         Notes
         -----
-        Closed pairs are held along y, and those of them that stick along x and z: by the springs of the law, or where
-        it is rigid by eliminating the upper node. Closed pairs that slip are free along x and z. Open pairs are free.
-        A loss factor that all materials share is that of the whole stiffness, the springs between faces included;
-        otherwise these springs have none.
+        The springs of the law connect closed pairs along y, and sticking pairs also along x and z; a rigid law
+        eliminates the upper node instead. Slipping pairs are free along x and z, open pairs in all directions. A loss
+        factor that all materials share applies to the whole stiffness, including the springs between faces; otherwise
+        these springs have none.
         """
         formulation = PRESETS[self.lap.preset]
         bodies = solid_model(
@@ -108,7 +108,7 @@ def preload(lap: BoltedLap, force: float, law: ContactLaw | None = None, *, max_
     force : float
         Preload, N; see `preload_force`.
     law : ContactLaw, optional
-        Of all three interfaces; ``ContactLaw()`` by default.
+        Law of all three interfaces; ``ContactLaw()`` by default.
     max_iterations : int
 
     Returns
@@ -142,8 +142,8 @@ def preload(lap: BoltedLap, force: float, law: ContactLaw | None = None, *, max_
 
     Examples
     --------
-    >>> from jointfrf.workbench.solids.bolted_lap import LapDivisions, bolted_lap
-    >>> from jointfrf.workbench.solids.preload import preload
+    >>> from jointfrf.workbench.cases.bolted_lap.lap import LapDivisions, bolted_lap
+    >>> from jointfrf.workbench.cases.bolted_lap.preload import preload
     >>> coarse = LapDivisions(across=4, rings=1, circles=0, head=1, nut=1)
     >>> tight = preload(bolted_lap((0.1, 0.1), divisions=coarse), 20e3)
     >>> {name: round(state.normal_force, 6) for name, state in tight.interfaces.items()}
@@ -200,7 +200,7 @@ class PressureMap:
         Pa; 0 where nothing touches.
     closed, slipping : ndarray of bool, shape (n,)
     nodes : ndarray of int, shape (n,)
-        Of the mesh, on the upper body, counted from 0.
+        Nodes of the mesh, on the upper body, counted from 0.
     """
 
     points: FloatArray
@@ -222,8 +222,7 @@ def pressure_maps(lap: BoltedLap, states: Mapping[str, InterfaceState]) -> dict[
     Returns
     -------
     dict of str to PressureMap
-        "head": upper face of A and the head; "lap": lower face of A and upper face of B; "nut": lower face of B and the
-        nut.
+        "head" (upper face of A), "lap" (between A and B) and "nut" (lower face of B).
     """
     return {name: _map(lap, name, states[name]) for name in INTERFACES}
 

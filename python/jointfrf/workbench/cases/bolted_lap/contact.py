@@ -51,7 +51,7 @@ class ContactLaw:
 
     Examples
     --------
-    >>> from jointfrf.workbench.solids.contact import ContactLaw
+    >>> from jointfrf.workbench.cases.bolted_lap.contact import ContactLaw
     >>> ContactLaw(friction=0.2)
     ContactLaw(friction=0.2, normal_stiffness=100000000000000.0, tangential_stiffness=10000000000000.0)
     """
@@ -77,7 +77,7 @@ class ContactInterface:
     lower, upper : ndarray of int, shape (n_pairs,)
         Nodes of the body on the side of lower y, and their partners on the body above, counted from 0.
     area : ndarray, shape (n_pairs,)
-        Of each pair, m^2.
+        Area of each pair, m^2.
     gap : ndarray, shape (n_pairs,), optional
         Distance along y before loading, m; zero by default.
     """
@@ -138,7 +138,7 @@ class Pairs:
         return tied
 
     def springs(self, law: ContactLaw, closed: BoolArray, sticking: BoolArray) -> sparse.csr_array:
-        """Return the stiffness of the pairs that are held by springs, (n, n)."""
+        """Return the stiffness of the springs between closed pairs, (n, n)."""
         stiffness = np.zeros((len(self.area), 3, 3))
         if law.normal_stiffness is not None:
             stiffness[closed, NORMAL, NORMAL] = law.normal_stiffness * self.area[closed]
@@ -173,7 +173,7 @@ def tie(pairs: Pairs, tied: BoolArray, fixed: ArrayLike = ()) -> tuple[sparse.cs
     Returns
     -------
     expansion : csr_array, shape (n, n_independent)
-        Of zeros and ones.
+        Zeros and ones.
     independent : ndarray of int, shape (n_independent,)
         These DOFs, ascending.
     """
@@ -194,7 +194,7 @@ def tie(pairs: Pairs, tied: BoolArray, fixed: ArrayLike = ()) -> tuple[sparse.cs
 
 @dataclass(frozen=True)
 class InterfaceState:
-    """What an interface carries, pair by pair.
+    """Forces and displacements of an interface, pair by pair.
 
     Attributes
     ----------
@@ -207,7 +207,7 @@ class InterfaceState:
     separation : ndarray, shape (n_pairs,)
         Distance along y, m; negative where closed pairs of finite stiffness overlap.
     slide : ndarray, shape (n_pairs, 2)
-        Of the upper node against the lower one along x and z, m.
+        Displacement of the upper node relative to the lower one along x and z, m.
     slip_ratio : ndarray, shape (n_pairs,)
         Shear stress over its limit mu p (4.1)-(4.2): 1 where slipping, 0 where open or without friction.
     """
@@ -253,7 +253,7 @@ class ContactSolution:
     Attributes
     ----------
     displacement : ndarray, shape (n,)
-        Of all DOFs.
+        Displacement of all DOFs.
     interfaces : dict of str to InterfaceState
     history : tuple of Iteration
     """
@@ -285,7 +285,7 @@ def solve_contact(
     law : ContactLaw, optional
         ``ContactLaw()`` by default.
     fixed : array_like of int
-        DOFs that are held.
+        DOFs that do not move.
     max_iterations : int
 
     Returns
@@ -295,19 +295,19 @@ def solve_contact(
     Raises
     ------
     ValueError
-        Arguments of wrong shape or range; a body that is held neither by supports nor by contact; an interface that
-        opens everywhere; no convergence.
+        An argument has a wrong shape or range, a body is free to move, an interface opens everywhere, or the iteration
+        does not converge.
 
     Notes
     -----
-    All pairs begin closed and sticking, which holds every body that touches a supported one. A closed pair in tension
+    All pairs begin closed and sticking, so a body that touches a supported one is supported. A closed pair in tension
     opens, an open one that overlaps closes (primal-dual active set). A sticking pair beyond the cone slips: its shear
     force is mu p against the sliding, solved for together with p, and its direction is found by Newton's method. A
     slipping pair that is pushed back sticks again. The load comes in one step, so its path is not traced: exact where
     the contacts do not depend on the level of the load, as without gaps and slip.
 
-    Slipping pairs are also held by springs of 1e-8 of the stiffness of a node, for bodies that only friction holds;
-    without slip there is no regularisation.
+    Springs of 1e-8 of the stiffness of a node act on slipping pairs, for bodies that only friction supports; without
+    slip there is no regularisation.
 
     Examples
     --------
@@ -315,7 +315,7 @@ def solve_contact(
 
     >>> import numpy as np
     >>> from jointfrf.workbench.solids.brick import Material, assemble_bricks
-    >>> from jointfrf.workbench.solids.contact import ContactInterface, solve_contact
+    >>> from jointfrf.workbench.cases.bolted_lap.contact import ContactInterface, solve_contact
     >>> corners = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])
     >>> nodes = [[0.01 * x, y, 0.01 * z] for y in (0.0, 0.01, 0.01, 0.02) for x, z in corners]
     >>> k, _ = assemble_bricks(nodes, [range(8), range(8, 16)], Material(70e9, 0.0, 2700.0))
@@ -412,9 +412,7 @@ class _Problem:
         except RuntimeError:  # exactly singular
             regular = False
         if not regular:
-            raise ValueError(
-                "a body can move freely: neither a support nor contact with a body that is supported holds it"
-            )
+            raise ValueError("a body can move freely; clamp one of its ends, or let it touch a body that is supported")
         q = factors.solve(right)
         u: FloatArray = t @ q + start
         return u, float(abs(matrix @ q - right).max() / abs(self.f).max())
