@@ -17,7 +17,7 @@ from msgspec import structs
 
 import jointfrf as jf
 from jointfrf.dofs import DIRECTIONS, rigid_motion
-from jointfrf.workbench.cases import catalogue
+from jointfrf.workbench.cases import run as case_run
 from jointfrf.workbench.cases.bolted_lap import frfs
 from jointfrf.workbench.cases.bolted_lap.contact import ContactLaw
 from jointfrf.workbench.cases.bolted_lap.frfs import resonance_errors, resonances
@@ -25,7 +25,8 @@ from jointfrf.workbench.cases.bolted_lap.lap import LapDivisions, bolted_lap
 from jointfrf.workbench.cases.bolted_lap.preload import preload
 from jointfrf.workbench.cases.bolted_lap.results import build_summary, build_tables
 from jointfrf.workbench.cases.bolted_lap.routes import DOFS, FivePoints, both_sides, measured_entries
-from jointfrf.workbench.cases.catalogue import CaseOutput, find_case, read_case, run_case
+from jointfrf.workbench.cases.catalogue import find_case, read_case
+from jointfrf.workbench.cases.run import CaseOutput, run_case
 from jointfrf.workbench.cli import run
 from jointfrf.workbench.cli.main import main
 from jointfrf.workbench.report.draw import draw
@@ -198,7 +199,7 @@ def ran(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(frfs, "bolted_lap", partial(bolted_lap, divisions=COARSE))
         patch.setattr(run, "run_case", kept)
-        patch.setattr(catalogue, "draw", DrawSome(frozenset(["pressure-bolt"])))
+        patch.setattr(case_run, "draw", DrawSome(frozenset(["pressure-bolt"])))
         with (
             contextlib.redirect_stdout(said),
             contextlib.redirect_stderr(complained),

@@ -15,15 +15,16 @@ import jointfrf as jf
 from jointfrf.dofs import Parameter
 from jointfrf.errors import FileContentError
 from jointfrf.toml.declared import NotNegative, Positive, key
-from jointfrf.workbench.cases.catalogue import KINDS, find_case, list_cases, read_case, read_case_and_kind, run_case
+from jointfrf.workbench.cases.catalogue import KINDS, find_case, list_cases, read_case, read_case_and_kind
 from jointfrf.workbench.cases.keys import Case, CaseKeys, ExpectedKeys
-from jointfrf.workbench.cases.kind import CaseKind
+from jointfrf.workbench.cases.kind import CaseKind, EstimateColumn, EstimateGroup, Estimates
 from jointfrf.workbench.cases.known_joint.exact import exact_frfs
-from jointfrf.workbench.cases.known_joint.realisations import estimate_realisations
 from jointfrf.workbench.cases.known_joint.regenerate import regenerate, regenerate_all
+from jointfrf.workbench.cases.run import run_case
 from jointfrf.workbench.cases.workers import Workers
 from jointfrf.workbench.report.figure import Curve, Figure, Panel
 from jointfrf.workbench.report.table import Table
+from thinned_cases import estimate_realisations
 
 
 def test_every_case_names_a_kind_of_the_registry_or_none():
@@ -75,12 +76,25 @@ def read(common, keys, expected):
     return Oscillator(**vars(common), mass=keys.mass, stiffness=keys.stiffness, expected=expected.stiffness)
 
 
-def compute(case, n_realisations, workers):
-    omega = 2 * np.pi * case.freq_hz
-    h = 1 / (case.stiffness - omega**2 * case.mass + 0j)
-    noisy = [jf.pollute(h[:, None, None], 0.01, "complex", case.seed, realisation=i) for i in range(n_realisations)]
-    found = workers.map(lambda one: float(np.mean(1 / one[:, 0, 0] + omega**2 * case.mass).real), noisy)
-    return Weighed(case, np.array(list(workers.counted(found, n_realisations))), h)
+def frfs(case):
+    return 1 / (case.stiffness - (2 * np.pi * case.freq_hz) ** 2 * case.mass + 0j)
+
+
+def groups(case, h, choice):
+    inertia = (2 * np.pi * case.freq_hz) ** 2 * case.mass
+
+    def source(first, count):
+        numbers = range(first, first + count)
+        noisy = [jf.pollute(h[:, None, None], 0.01, "complex", case.seed, realisation=i) for i in numbers]
+        return Estimates.without_intervals(np.array([[np.mean(1 / one[:, 0, 0] + inertia).real] for one in noisy]))
+
+    column = EstimateColumn("mean", "k_x", "N/m", case.stiffness, np.nan)
+    return [EstimateGroup("1 %", "mean", (column,), source)]
+
+
+def result(computed):
+    (found,) = computed.estimates()
+    return Weighed(computed.case, found.estimates.values[:, 0], computed.frfs)
 
 
 def tables(result):
@@ -98,7 +112,9 @@ OSCILLATOR = CaseKind(
     keys=OscillatorKeys,
     expected_keys=OscillatorExpected,
     read=read,
-    compute=compute,
+    frfs=frfs,
+    groups=groups,
+    result=result,
     tables=tables,
     figures=figures,
     summary=lambda result, tables: [
@@ -231,7 +247,9 @@ class PendulumKeys(CaseKeys, tag="pendulum"):
 KIND = CaseKind(
     keys=PendulumKeys,
     read=lambda common, keys, expected: common,
-    compute=lambda case, count, workers: case,
+    frfs=lambda case: None,
+    groups=lambda case, frfs, choice: [],
+    result=lambda computed: computed.case,
     tables=lambda result: [Table("arm", "Arm", ("quantity",), (("seen",),))],
     figures=lambda result: [],
     summary=lambda result, tables: [],

@@ -15,8 +15,9 @@ from threading import Lock
 
 from jointfrf.extras import check_extras
 from jointfrf.parallel.pool import available_cores
-from jointfrf.workbench.cases.catalogue import UnknownCaseError, find_case, list_cases, run_case
+from jointfrf.workbench.cases.catalogue import UnknownCaseError, find_case, list_cases
 from jointfrf.workbench.cases.keys import Case
+from jointfrf.workbench.cases.run import run_case
 from jointfrf.workbench.cases.workers import Workers, started_workers
 from jointfrf.workbench.cli.usage import Output, UsageError, check_out, waiting
 from jointfrf.workbench.report.table import Table, as_text

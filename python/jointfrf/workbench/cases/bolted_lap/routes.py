@@ -24,6 +24,7 @@ from jointfrf.substructuring.modification import inverse_substructuring
 from jointfrf.workbench.cases.bolted_lap.keys import DOFS, BoltedLapCase
 
 __all__ = [
+    "ESTIMATORS",
     "FivePoints",
     "Found",
     "band_means",
@@ -38,6 +39,11 @@ __all__ = [
 
 #: Directions x, y, z.
 _AXES = np.eye(3)
+#: Names of the methods of a case in tables, and their routes to the FRFs of the joint DOFs.
+ESTIMATORS = {
+    "ismm": ("band mean", ("Measurements 1-4", "central differences", "virtual points", "multi-point")),
+    "compliance": ("compliance fit", ("central differences", "virtual points")),
+}
 
 
 @dataclass(frozen=True)

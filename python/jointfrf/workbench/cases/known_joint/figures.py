@@ -150,7 +150,7 @@ def _noise_found(result: KnownJointResult) -> Iterator[Figure]:
 
 def _sensitivities(result: KnownJointResult) -> Iterator[Figure]:
     for one in result.case.observed:
-        reach = abs(result.sensitivities[one.key].change).max(axis=1)
+        reach = abs(result.sensitive["actual"].sensitivities[one.key].change).max(axis=1)
         for d, dof in enumerate(result.case.joint.dofs):
             if reach[d] < _UNMOVED * reach.max():
                 continue
@@ -176,7 +176,8 @@ def _varied_panels(result: KnownJointResult, one: Observed, d: int) -> tuple[Pan
 
 def _sensitivity_panel(result: KnownJointResult, one: Observed, stiffness: Parameter, damping: Parameter) -> Panel:
     """Draw the sensitivity of an FRF to stiffness and damping of a DOF, and the bands that follow."""
-    actual, initial = (found[one.key].in_db for found in (result.sensitivities, result.from_initial.sensitivities))
+    sensitive = result.sensitive
+    actual, initial = (sensitive[joint].sensitivities[one.key].in_db for joint in ("actual", "initial"))
     drawn = ((stiffness, actual, "", "stiffness"), (stiffness, initial, ", first estimate", "stiffness-initial"),
              (damping, actual, "", "damping"))  # fmt: skip
     curves = tuple(
@@ -190,8 +191,8 @@ def _sensitivity_panel(result: KnownJointResult, one: Observed, stiffness: Param
     )
     label = f"change of $H_{{{one.point * 2}}}$ per 1 %, dB"
     key = (one.key, stiffness)
-    strips = ((f"proposed for {symbol(stiffness)}", tuple(result.proposals[key])),
-              ("proposed from the first estimate", tuple(result.from_initial.proposals[key])))  # fmt: skip
+    strips = ((f"proposed for {symbol(stiffness)}", tuple(sensitive["actual"].proposals[key])),
+              ("proposed from the first estimate", tuple(sensitive["initial"].proposals[key])))  # fmt: skip
     return Panel("", FREQUENCY, label, curves, shades=_shades(result, stiffness), strips=strips)
 
 

@@ -100,17 +100,12 @@ def _region_rows(result: KnownJointResult, known: ExpectedRegions) -> list[tuple
     for band in known.bands:
         cells: list[Cell] = [known.parameter, frf_name(result, observed), bands_in_words([band])]
         levels = []
-        for sensitive in _both(result):
+        for sensitive in result.sensitive.values():
             level = _level(result, sensitive, known, band)
             levels.append(level)
             cells += [_proposed(sensitive, observed, known.parameter), level]
         rows.append((*cells, verdict(any(level is not None and level >= _TWICE for level in levels))))
     return rows
-
-
-def _both(result: KnownJointResult) -> tuple[SensitiveBands, SensitiveBands]:
-    """With the first estimate, and with the actual joint."""
-    return result.from_initial, SensitiveBands(result.sensitivities, result.proposals)
 
 
 def _level(result: KnownJointResult, sensitive: SensitiveBands, known: ExpectedRegions, band: Band) -> float | None:
@@ -129,11 +124,11 @@ def band_table(result: KnownJointResult) -> Table:
         (
             parameter,
             "; ".join(dict.fromkeys(bands_in_words(s.bands[parameter]) for s in sets)),
-            joint,
+            JOINT_NAMES[joint],
             *(_proposed(sensitive, one, parameter) for one in observed),
         )
         for parameter in result.case.parameters
-        for joint, sensitive in zip(JOINT_NAMES.values(), _both(result), strict=True)
+        for joint, sensitive in result.sensitive.items()
     )
     proposed = tuple(f"proposed from {frf_name(result, one)}, Hz" for one in observed)
     columns = ("parameter", "bands of the case, Hz", "joint", *proposed)
@@ -421,13 +416,12 @@ def build_numbers(result: KnownJointResult) -> dict[str, Any]:
         "natural_frequencies_hz": {joint: modes.freq_hz.tolist() for joint, modes in result.modes.items()},
         "identified": [row.numbers() for row in identified_rows(result)],
         "noise_free_relative_error": {method: found.error for method, found in result.noise_free.items()},
-        "proposed_bands_hz": {
-            f"{frf_name(result, one)} {parameter.name}": result.proposals[one.key, parameter]
-            for one in case.observed for parameter in case.parameters
-        },
-        "proposed_bands_of_first_estimate_hz": {
-            f"{frf_name(result, one)} {parameter.name}": result.from_initial.proposals[one.key, parameter]
-            for one in case.observed for parameter in case.parameters
+        **{
+            key: {
+                f"{frf_name(result, one)} {parameter.name}": result.sensitive[joint].proposals[one.key, parameter]
+                for one in case.observed for parameter in case.parameters
+            }
+            for key, joint in (("proposed_bands_hz", "actual"), ("proposed_bands_of_first_estimate_hz", "initial"))
         },
     }  # fmt: skip
 
