@@ -16,12 +16,12 @@ from jointfrf.identification.realisations import viscous_joints
 from jointfrf.substructuring.methods import STIFFNESS_METHODS
 from jointfrf.workbench.cases.catalogue import UnknownCaseError, find_case, list_cases, read_case
 from jointfrf.workbench.cases.known_joint.exact import exact_frfs, noise_free_errors
+from jointfrf.workbench.cases.known_joint.expected import identified_rows
 from jointfrf.workbench.cases.known_joint.figures import build_figures
 from jointfrf.workbench.cases.known_joint.tables import (
     build_numbers,
     build_summary,
     build_tables,
-    identified_rows,
 )
 from jointfrf.workbench.cases.run import numbered, run_case
 from jointfrf.workbench.report.document import Page, make_document

@@ -17,8 +17,9 @@ import jointfrf as jf
 from jointfrf.workbench.cases.catalogue import read_case
 from jointfrf.workbench.cases.known_joint import KIND
 from jointfrf.workbench.cases.known_joint.exact import exact_frfs
+from jointfrf.workbench.cases.known_joint.expected import identified_rows
 from jointfrf.workbench.cases.known_joint.figures import build_figures
-from jointfrf.workbench.cases.known_joint.tables import build_numbers, build_tables, identified_rows
+from jointfrf.workbench.cases.known_joint.tables import build_numbers, build_tables
 from jointfrf.workbench.cases.run import compute_case
 from own_case import BEAMS, RECEPTANCES, replace_tables, write_by_matrices, write_by_receptances, write_case
 

@@ -7,7 +7,8 @@ realisations  many realisations of the noise: identified parameters, for cases a
 regenerate    FRFs of the assembly from identified and from printed parameters, and their errors
 modes         mode shapes of the assembly, and drawings of them
 compute       the result; sensitivity of the observed FRFs to the joint
-tables        numbers beside those of the source, and what follows exactly from what it prints
+expected      the comparison with `expected.toml`: published numbers, and errors that follow from printed parameters
+tables        the tables
 figures       the figures
 """
 

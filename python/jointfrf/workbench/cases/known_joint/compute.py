@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from jointfrf.dofs import Parameter
-from jointfrf.frf.bands import Band, in_bands
+from jointfrf.frf.bands import Band
 from jointfrf.identification.sensitivity import Sensitivity, propose_bands, sensitivity
 from jointfrf.joint import Joint
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import ComplexArray
 from jointfrf.workbench.cases.kind import Computed
 from jointfrf.workbench.cases.known_joint.exact import Exact, NoiseFree, noise_free_errors
 from jointfrf.workbench.cases.known_joint.keys import KnownJointCase
@@ -24,7 +21,7 @@ from jointfrf.workbench.cases.known_joint.regenerate import (
     regenerate_all,
 )
 
-__all__ = ["KnownJointResult", "SensitiveBands", "contrast", "known_joint_result", "sensitive_bands"]
+__all__ = ["KnownJointResult", "SensitiveBands", "known_joint_result", "sensitive_bands"]
 
 
 @dataclass(frozen=True)
@@ -66,33 +63,6 @@ def sensitive_bands(case: KnownJointCase, exact: Exact, joint: Joint, h_c: Compl
         for parameter, change in zip(case.parameters, own.change, strict=True)
     }
     return SensitiveBands(found, proposals)
-
-
-def contrast(freq_hz: FloatArray, change: ComplexArray, region: Band, regions: Sequence[Band]) -> float | None:
-    """How much more sensitive an FRF is inside a region than outside all of them, dB.
-
-    Parameters
-    ----------
-    freq_hz : ndarray, shape (n_freq,)
-        Hz.
-    change : ndarray, shape (n_freq,)
-        A row of `Sensitivity.change`.
-    region : (low, high)
-        Hz.
-    regions : sequence of (low, high)
-        All that the source names for the parameter, Hz.
-
-    Returns
-    -------
-    float or None
-        Median of the modulus over the lines inside, relative to that over the lines outside; medians, since resonances
-        and antiresonances are narrow. None where a median is zero, or no line is outside.
-    """
-    outside = ~in_bands(freq_hz, regions)
-    if not outside.any():
-        return None
-    within, without = (float(np.median(abs(change[lines]))) for lines in (in_bands(freq_hz, [region]), outside))
-    return float(20 * np.log10(within / without)) if within > 0 and without > 0 else None
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from jointfrf.identification.fit_data import ModelData
 from jointfrf.identification.record import fit_to_dict
 from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.identification.result import Fit
+from jointfrf.workbench.cases.comparison import Compared, compared_table
 from jointfrf.workbench.cases.modelled_joint.compute import ModelledJointResult, moving_stiffness
 from jointfrf.workbench.report.figure import Curve, Figure, Panel, Ribbon
 from jointfrf.workbench.report.table import Cell, Table, number
@@ -30,8 +31,7 @@ def _parameters(result: ModelledJointResult) -> Table:
     """Parameters beside their bound, and how often intervals hold them."""
     from scipy.stats import binom
 
-    rows: list[tuple[Cell, ...]] = []
-    failing = []
+    rows = []
     for c, column in enumerate(result.found.group.columns):
         actual, size = column.actual, abs(column.actual)
         values, low, high = (array[:, c] for array in result.found.estimates)
@@ -39,18 +39,17 @@ def _parameters(result: ModelledJointResult) -> Table:
         fits = bool(binom.cdf(inside, len(values), 0.95) > _CHANCE)
         rmse = float(np.sqrt(np.mean((values - actual) ** 2)))
         limits = [float(np.percentile(values, share)) for share in (50, 2.5, 97.5)]
-        if not fits:
-            failing.append(len(rows))
-        rows.append((
+        cells: tuple[Cell, ...] = (
             column.parameter, column.unit, actual, *limits, 100 * rmse / size, 100 * column.bound / size,
-            100 * inside / len(values), "fits" if fits else "does not fit",
-        ))  # fmt: skip
-    columns = ("parameter", "unit", "actual", "median", "2.5 %", "97.5 %", "RMSE, %", "bound, %", "coverage, %", "")
-    return Table(
-        "parameters", "Parameters of the joint and of the models", columns, tuple(rows), tuple(failing),
+            100 * inside / len(values),
+        )  # fmt: skip
+        rows.append(Compared(cells, fits))
+    columns = ("parameter", "unit", "actual", "median", "2.5 %", "97.5 %", "RMSE, %", "bound, %", "coverage, %")
+    return compared_table(
+        "parameters", "Parameters of the joint and of the models", columns, rows,
         "Bound: Cramér-Rao, with the models and the priors. Coverage: how often the 95 % interval holds the actual "
         "value; it does not fit where so few are likely by less than 0.5 %.",
-        ("RMSE, %", "bound, %", "coverage, %"),
+        columns[6:],
     )  # fmt: skip
 
 
