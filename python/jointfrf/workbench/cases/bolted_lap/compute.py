@@ -28,7 +28,6 @@ from jointfrf.workbench.cases.bolted_lap.routes import (
     ESTIMATORS,
     FivePoints,
     Found,
-    band_means,
     by_band_means,
     by_compliance_fit,
     fit_measured,
@@ -239,7 +238,7 @@ def _unmeasured(case: BoltedLapCase, beams: BeamFrfs) -> list[Unmeasured]:
     found = []
     for name, h in masked.items():
         lines = joint_stiffness_lines(h)
-        theta = band_means(case, lines)
+        theta = case.bands.means(case.freq_hz, lines)
         # Without some of its entries gamma belongs to no joint whose cross terms are zero.
         fit = fit_measured(case.freq_hz, DOFS, h, np.eye(12))
         fitted = np.concatenate([fit.stiffness, fit.damping])

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from jointfrf.dofs import Parameter
-from jointfrf.frf.bands import Band
 from jointfrf.joint import Joint
 from jointfrf.toml.declared import Keys, NotNegative, Positive, key
 from jointfrf.workbench.cases.bolted_lap.lap import PROOF_STRENGTH, STRESS_AREA, Bolt, lap_bricks, preload_force
@@ -137,10 +135,6 @@ class BoltedLapCase(Case, WithActualJoint):
     bands: BandSet
     noises: tuple[Noise, ...]
     expected: ExpectedFrequencies | None
-
-    def bands_of(self, dof: str) -> list[Band]:
-        """Bands of the stiffness and damping of a DOF, Hz."""
-        return self.bands.bands[Parameter.of_dof("k", dof)]
 
 
 def read_bolted_lap(common: Case, keys: BoltedLapKeys, expected: BoltedLapExpected) -> BoltedLapCase:

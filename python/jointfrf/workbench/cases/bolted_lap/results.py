@@ -298,7 +298,7 @@ def _lines(result: BoltedLapResult) -> Iterator[Figure]:
         for parameter, _ in parameters:
             lines = {route: _values(result, k, parameter) for route, k in result.k_lines.items()}
             curves = tuple(Curve(route, freq, values, _LINE_STYLES[route]) for route, values in lines.items())
-            shades = (("band", tuple(result.case.bands_of(parameter.row))),)
+            shades = (("band", tuple(result.case.bands.bands[parameter])),)
             levels = (Level("compliance fit, virtual points", fitted[parameter], "compliance"),)
             limits = bulk_limits(list(lines.values()), [fitted[parameter]])
             panels.append(

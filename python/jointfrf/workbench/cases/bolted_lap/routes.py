@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from jointfrf.channels.point_lines import difference_weights
 from jointfrf.channels.virtual_point import VirtualPoint, virtual_point, virtual_points
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning, IllConditionedWarning
-from jointfrf.frf.bands import band_mean
 from jointfrf.identification.identify import identify
 from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -27,7 +26,6 @@ __all__ = [
     "ESTIMATORS",
     "FivePoints",
     "Found",
-    "band_means",
     "both_sides",
     "by_band_means",
     "by_compliance_fit",
@@ -177,16 +175,9 @@ def _multi_point(points: tuple[FivePoints, FivePoints], h: ComplexArray) -> Comp
         return invert(multi_point_compliance(h, j, k, rank=6).equivalent)
 
 
-def band_means(case: BoltedLapCase, k_lines: ComplexArray) -> FloatArray:
-    """Means of Re K* and Im K*/w over the bands of each DOF, shape (12,)."""
-    dofs = case.joint.dofs
-    mean = band_mean(case.freq_hz, k_lines, {dof: case.bands_of(dof) for dof in dofs}, dofs)
-    return np.concatenate([mean.stiffness, mean.damping])
-
-
 def by_band_means(case: BoltedLapCase, k_lines: Mapping[str, ComplexArray]) -> list[Found]:
     """Constants of every route as means over bands."""
-    return [Found(route, "band mean", band_means(case, k)) for route, k in k_lines.items()]
+    return [Found(route, "band mean", case.bands.means(case.freq_hz, k)) for route, k in k_lines.items()]
 
 
 def by_compliance_fit(case: BoltedLapCase, points: tuple[FivePoints, FivePoints], h: ComplexArray) -> list[Found]:

@@ -11,9 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from jointfrf.dofs import joint_parameters
 from jointfrf.errors import IllConditionedWarning
-from jointfrf.frf.bands import in_bands
 from jointfrf.frf.noise import NOISE_KINDS
 from jointfrf.identification.information_bound import least_std_errors
 from jointfrf.identification.model.realisations import RealisationFits
@@ -42,7 +40,7 @@ from jointfrf.workbench.cases.known_joint.exact import (
 )
 from jointfrf.workbench.cases.known_joint.keys import KnownJointCase
 
-__all__ = ["ALL_LINES", "Identified", "chunk_size", "estimate_groups", "identified_joints", "means_over_bands"]
+__all__ = ["ALL_LINES", "Identified", "chunk_size", "estimate_groups", "identified_joints"]
 
 #: Lines, and entries of their FRF matrices, treated at once, over realisations: bound the memory to some tens of MB.
 _CHUNK, _CHUNK_ENTRIES = 20_000, 1_500_000
@@ -79,31 +77,6 @@ class Identified:
 def chunk_size(n_freq: int, entries: int) -> int:
     """Return how many realisations of `n_freq` lines, with so many entries each, are treated at once."""
     return max(1, min(_CHUNK, _CHUNK_ENTRIES // entries) // n_freq)
-
-
-def means_over_bands(exact: Exact, k_joint: ComplexArray, band_set: BandSet) -> FloatArray:
-    """Mean of Re K* and Im K*/w of several realisations, each parameter over its own bands.
-
-    Parameters
-    ----------
-    exact : Exact
-        Names the lines and the n DOFs.
-    k_joint : ndarray, shape (r, n_freq, n, n)
-        N/m.
-    band_set : BandSet
-
-    Returns
-    -------
-    ndarray, shape (r, 2 n)
-        Stiffness of all DOFs, then damping.
-    """
-    found = np.empty((len(k_joint), 2 * exact.n))
-    for p, parameter in enumerate(joint_parameters(exact.dofs)):
-        inside, d = in_bands(exact.freq_hz, band_set.bands[parameter]), p % exact.n
-        lines = k_joint[:, inside, d, d]
-        values = lines.real if p < exact.n else lines.imag / (2 * np.pi * exact.freq_hz[inside])
-        found[:, p] = values.mean(axis=1)
-    return found
 
 
 def identified_joints(case: KnownJointCase, found: Sequence[GroupEstimates]) -> list[Identified]:
@@ -213,7 +186,7 @@ class BandMeanSource:
             return joint_lines(self.exact, self.method, self.frfs(first, count), "nan")
 
     def _means(self, k_joint: ComplexArray) -> FloatArray:
-        return np.concatenate([means_over_bands(self.exact, k_joint, one) for one in self.band_sets], axis=1)
+        return np.concatenate([one.means(self.exact.freq_hz, k_joint) for one in self.band_sets], axis=1)
 
 
 @dataclass(frozen=True)
