@@ -6,16 +6,19 @@ import subprocess
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Annotated
 
 import numpy as np
 import pytest
 
 import jointfrf as jf
+from jointfrf.choices import CASE_KINDS
 from jointfrf.dofs import Parameter
 from jointfrf.errors import FileContentError
 from jointfrf.toml.declared import NotNegative, Positive, key
-from jointfrf.workbench.cases.catalogue import KINDS, find_case, list_cases, read_case, read_case_and_kind
+from jointfrf.workbench.cases import catalogue
+from jointfrf.workbench.cases.catalogue import find_case, kind_named, list_cases, read_case, read_case_and_kind
 from jointfrf.workbench.cases.keys import Case, CaseKeys, ExpectedKeys
 from jointfrf.workbench.cases.kind import CaseKind, EstimateColumn, EstimateGroup, Estimates
 from jointfrf.workbench.cases.known_joint.exact import exact_frfs
@@ -28,7 +31,7 @@ from thinned_cases import estimate_realisations
 
 
 def test_every_case_names_a_kind_of_the_registry_or_none():
-    assert list(KINDS) == ["known-joint", "bolted-lap", "modelled-joint"]
+    assert [kind_named(name).name for name in CASE_KINDS] == ["known-joint", "bolted-lap", "modelled-joint"]
     kinds = {folder.name: read_case_and_kind(folder)[1].name for folder in list_cases()}
     assert kinds.pop("4.3.3-bolt") == "bolted-lap"
     assert kinds.pop("rubber-mount") == "modelled-joint"
@@ -139,6 +142,13 @@ seed = 5
 
 
 @pytest.fixture
+def registered(monkeypatch):
+    """The kind is registered: its line of the registry and its package."""
+    monkeypatch.setattr(catalogue, "CASE_KINDS", (*CASE_KINDS, "oscillator"))
+    monkeypatch.setitem(sys.modules, "jointfrf.workbench.cases.oscillator", SimpleNamespace(KIND=OSCILLATOR))
+
+
+@pytest.fixture
 def folder(tmp_path):
     own = tmp_path / "one-mass"
     own.mkdir()
@@ -147,10 +157,11 @@ def folder(tmp_path):
     return own
 
 
+@pytest.mark.usefixtures("registered")
 def test_a_kind_of_ones_own_goes_through_the_same_door(folder, tmp_path):
     reported = []
     workers = Workers(progress=lambda done, total: reported.append((done, total)))
-    output = run_case(folder, tmp_path / "out", png=True, workers=workers, kinds={**KINDS, "oscillator": OSCILLATOR})
+    output = run_case(folder, tmp_path / "out", png=True, workers=workers)
     assert (output.case.mass, output.case.expected, output.case.realisations) == (2.0, 490.0, 40)
     assert output.result.stiffness == pytest.approx(500, rel=0.01)
     assert reported == [(i + 1, 40) for i in range(40)]
@@ -167,6 +178,7 @@ def test_a_kind_of_ones_own_goes_through_the_same_door(folder, tmp_path):
     assert [table.key for table in output.printed] == ["found"]
 
 
+@pytest.mark.usefixtures("registered")
 @pytest.mark.parametrize(
     ("file", "old", "new", "message"),
     [
@@ -180,7 +192,7 @@ def test_a_kind_of_ones_own_gets_the_same_sentences(folder, file, old, new, mess
     path = folder / file
     path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(FileContentError, match=message):
-        read_case(folder, {"oscillator": OSCILLATOR})
+        read_case(folder)
 
 
 def test_a_kind_that_is_not_registered_is_told(folder):

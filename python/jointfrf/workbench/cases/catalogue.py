@@ -3,53 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from jointfrf.choices import CASE_KINDS
-from jointfrf.toml.declared import read_keys
+from jointfrf.toml.declared import Keys, read_keys
 from jointfrf.toml.documents import key_reference
 from jointfrf.toml.table import TomlTable, read_toml
 from jointfrf.workbench.cases.keys import Case
 from jointfrf.workbench.cases.kind import CaseKind
 
 __all__ = [
-    "KINDS",
     "UnknownCaseError",
     "case_title",
     "cases_folder",
     "find_case",
     "key_page",
+    "kind_named",
     "list_cases",
     "read_case",
     "read_case_and_kind",
     "read_case_of",
 ]
-
-
-class _Kinds(Mapping[str, CaseKind[Any, Any, Any]]):
-    """Kinds of cases by name, each the `KIND` of the package of this name, imported when it is needed."""
-
-    def __init__(self, *names: str) -> None:
-        self._names = names
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
-
-    def __getitem__(self, name: str) -> CaseKind[Any, Any, Any]:
-        if name not in self._names:
-            raise KeyError(name)
-        kind: CaseKind[Any, Any, Any] = import_module(f"jointfrf.workbench.cases.{name.replace('-', '_')}").KIND
-        return kind
-
-
-#: The kinds of cases, by the value of `kind` in `case.toml`.
-KINDS: Mapping[str, CaseKind[Any, Any, Any]] = _Kinds(*CASE_KINDS)
 
 
 class UnknownCaseError(ValueError):
@@ -114,15 +90,19 @@ def find_case(word: str) -> Path:
     raise UnknownCaseError(f"unknown case {word!r}; name a folder with a case.toml, or one of the cases {names}")
 
 
-def read_case(folder: Path, kinds: Mapping[str, CaseKind[Any, Any, Any]] = KINDS) -> Case:
-    """Read a case of whatever kind its `case.toml` names.
+def kind_named(name: str) -> CaseKind[Any, Any, Any]:
+    """Return a kind of cases by the value of `kind` in `case.toml`: the `KIND` of the package of this name."""
+    kind: CaseKind[Any, Any, Any] = import_module(f"jointfrf.workbench.cases.{name.replace('-', '_')}").KIND
+    return kind
+
+
+def read_case(folder: Path) -> Case:
+    """Read a case of the kind that its `case.toml` names.
 
     Parameters
     ----------
     folder : Path
         Folder with `case.toml` and, if there are numbers to compare with, `expected.toml`.
-    kinds : mapping of str to CaseKind
-        Kinds that may be named; a file without the key `kind` is of the first.
 
     Returns
     -------
@@ -134,26 +114,22 @@ def read_case(folder: Path, kinds: Mapping[str, CaseKind[Any, Any, Any]] = KINDS
     FileContentError
         One sentence that names the file and the key.
     """
-    return read_case_and_kind(folder, kinds)[0]
+    return read_case_and_kind(folder)[0]
 
 
-def read_case_and_kind(
-    folder: Path, kinds: Mapping[str, CaseKind[Any, Any, Any]] = KINDS
-) -> tuple[Case, CaseKind[Any, Any, Any]]:
+def read_case_and_kind(folder: Path) -> tuple[Case, CaseKind[Any, Any, Any]]:
     """Read a case as `read_case` does, and return its kind, too."""
     path = folder / "expected.toml"
     expected = read_toml(path) if path.is_file() else TomlTable({}, str(path))
-    return read_case_of(folder, read_toml(folder / "case.toml"), expected, kinds)
+    return read_case_of(folder, read_toml(folder / "case.toml"), expected)
 
 
-def read_case_of(
-    folder: Path, table: TomlTable, expected: TomlTable, kinds: Mapping[str, CaseKind[Any, Any, Any]] = KINDS
-) -> tuple[Case, CaseKind[Any, Any, Any]]:
+def read_case_of(folder: Path, table: TomlTable, expected: TomlTable) -> tuple[Case, CaseKind[Any, Any, Any]]:
     """Read a case from the tables of its `case.toml` and its `expected.toml`."""
-    name = table.content.get("kind", next(iter(kinds)))
-    if not isinstance(name, str) or name not in kinds:
-        raise table.error("kind", f"one of {', '.join(kinds)}")
-    kind = kinds[name]
+    name = table.content.get("kind", CASE_KINDS[0])
+    if name not in CASE_KINDS:
+        raise table.error("kind", f"one of {', '.join(CASE_KINDS)}")
+    kind = kind_named(name)
     keys, known = read_keys(table, kind.keys), read_keys(expected, kind.expected_keys)
     common = Case(
         folder=folder.resolve(),
@@ -181,9 +157,10 @@ stands for the name of a joint DOF (`k_theta_z`).
 """
 
 
-def key_page(kinds: Mapping[str, CaseKind[Any, Any, Any]] = KINDS) -> str:
-    """Return the reference of all keys of kinds of cases, as Markdown."""
-    tops = {f"case.toml of kind {name}": kind.keys for name, kind in kinds.items()}
-    known = {f"expected.toml of kind {name}": kind.expected_keys for name, kind in kinds.items()}
-    return _KEYS_HEAD + key_reference({name: top for each in zip(tops.items(), known.items(), strict=True)
-                                       for name, top in each})  # fmt: skip
+def key_page() -> str:
+    """Return the reference of all keys of all kinds of cases, as Markdown."""
+    tops: dict[str, type[Keys]] = {}
+    for name in CASE_KINDS:
+        kind = kind_named(name)
+        tops |= {f"case.toml of kind {name}": kind.keys, f"expected.toml of kind {name}": kind.expected_keys}
+    return _KEYS_HEAD + key_reference(tops)

@@ -223,9 +223,9 @@ class CaseKind(Generic[CaseT, FrfsT, ResultT]):
 
     Examples
     --------
-    >>> from jointfrf.workbench.cases.catalogue import KINDS
-    >>> KINDS["bolted-lap"].name
-    'bolted-lap'
+    >>> from jointfrf.workbench.cases.catalogue import kind_named
+    >>> kind_named("bolted-lap").methods
+    ('ismm', 'compliance')
     """
 
     keys: type[CaseKeys]

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from jointfrf.files import OwnFolder, check_stated, clean_name
-from jointfrf.workbench.cases.catalogue import KINDS, read_case_and_kind
+from jointfrf.workbench.cases.catalogue import read_case_and_kind
 from jointfrf.workbench.cases.comparison import verdict_sentence
 from jointfrf.workbench.cases.keys import Case
 from jointfrf.workbench.cases.kind import CaseKind, Computed, EstimateGroup, Estimates, GroupEstimates
@@ -138,7 +138,6 @@ def run_case(
     at_most: int | None = None,
     png: bool = False,
     workers: Workers | None = None,
-    kinds: Mapping[str, CaseKind[Any, Any, Any]] = KINDS,
     show: Callable[[Case, list[Table]], None] = lambda case, tables: None,
 ) -> CaseOutput:
     """Run a case and write its report, tables and figures.
@@ -158,8 +157,6 @@ def run_case(
         Whether to write `figures/*.png`, too.
     workers : Workers, optional
         Processes that share the work, see `jointfrf.workbench.cases.workers.started_workers`; this process by default.
-    kinds : mapping of str to CaseKind
-        As in `read_case`.
     show : callable, optional
         Called with the case and its tables that are worth printing, the summary first, before figures are drawn.
 
@@ -178,7 +175,7 @@ def run_case(
         if number is not None and number < 1:
             raise ValueError(f"{name} must be at least 1, not {number}")
     at_work = workers or Workers()
-    case, kind = read_case_and_kind(Path(folder), kinds)
+    case, kind = read_case_and_kind(Path(folder))
     count = case.realisations if realisations is None else realisations
     count = min(count, at_most or count)
     if realisations is None:

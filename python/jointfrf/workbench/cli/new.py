@@ -7,11 +7,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+from jointfrf.choices import CASE_KINDS
 from jointfrf.files import OwnFolder
 from jointfrf.toml.documents import key_template, schema_of
 from jointfrf.workbench.assembly_file.keys import AssemblyKeys, PartsKeys
 from jointfrf.workbench.assembly_file.template import TEMPLATE
-from jointfrf.workbench.cases.catalogue import KINDS
+from jointfrf.workbench.cases.catalogue import kind_named
 from jointfrf.workbench.cli.arguments.new import ASSEMBLY, STUDY
 from jointfrf.workbench.cli.usage import Output, UsageError
 
@@ -26,7 +27,7 @@ def run(options: argparse.Namespace) -> int:
     if options.kind == ASSEMBLY:
         return _new_assembly(options)
     is_study = options.kind == STUDY
-    top = KINDS[next(iter(KINDS)) if is_study else options.kind].keys
+    top = kind_named(CASE_KINDS[0] if is_study else options.kind).keys
     schema = json.dumps(schema_of(top), indent=1) + "\n"
     if options.schema:
         print(schema, end="")  # for a file, whatever else is asked for
