@@ -72,7 +72,7 @@ def compared_table(
     own = list(rows)
     words = {True: _FITS, False: _DOES_NOT_FIT, None: ""}
     cells = tuple((*row.cells, words[row.fits]) for row in own)
-    failing = tuple(i for i, row in enumerate(own) if row.fits is False)
+    failing = tuple(i for i, row in enumerate(own) if row.fits is not None and not row.fits)
     return Table(key, title, (*columns, ""), cells, failing, note, percentages)
 
 
