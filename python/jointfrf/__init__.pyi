@@ -101,6 +101,17 @@ from jointfrf.workbench.amplitude.levels import JointLevel, JointLevels, levels
 from jointfrf.workbench.amplitude.lines import Drive
 from jointfrf.workbench.assembly_file.measured import MeasuredAssembly, measured_assembly
 from jointfrf.workbench.assembly_file.read import AssemblyPart, read_part
+from jointfrf.workbench.cases.bolted_lap.contact import ContactLaw
+from jointfrf.workbench.cases.bolted_lap.lap import (
+    PROOF_STRENGTH,
+    STRESS_AREA,
+    Bolt,
+    BoltedLap,
+    LapDivisions,
+    bolted_lap,
+    preload_force,
+)
+from jointfrf.workbench.cases.bolted_lap.preload import PreloadedLap, preload
 from jointfrf.workbench.planning.assemblies import assemblies_needed, expected_half_width
 from jointfrf.workbench.planning.joint_frfs import JointFrfPlan, plan_joint_frfs
 from jointfrf.workbench.planning.plan import MeasurementPlan, plan
@@ -112,20 +123,9 @@ from jointfrf.workbench.report.fit_page import write_report
 from jointfrf.workbench.report.levels_page import write_levels
 from jointfrf.workbench.report.plan_page import write_plan
 from jointfrf.workbench.report.pool_page import write_pool
-from jointfrf.workbench.solids.bolted_lap import (
-    PROOF_STRENGTH,
-    STRESS_AREA,
-    Bolt,
-    BoltedLap,
-    LapDivisions,
-    bolted_lap,
-    preload_force,
-)
 from jointfrf.workbench.solids.brick import Material, assemble_bricks, brick_quality, element_matrices
 from jointfrf.workbench.solids.brick_beam import Hole, brick_beam
-from jointfrf.workbench.solids.contact import ContactLaw
 from jointfrf.workbench.solids.mesh import Mesh, interpolation
-from jointfrf.workbench.solids.preload import PreloadedLap, preload
 from jointfrf.workbench.solids.solid import Patch, SolidModel, solid_model
 from jointfrf.workbench.studies.design import StudyDesign
 from jointfrf.workbench.studies.result import StudyResult, read_study

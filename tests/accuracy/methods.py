@@ -27,7 +27,6 @@ from cramer_rao import cramer_rao
 from jointfrf.identification.manifold.coordinates import joint_terms
 from jointfrf.workbench.cases.catalogue import find_case, read_case
 from jointfrf.workbench.cases.known_joint.exact import exact_frfs
-from jointfrf.workbench.cases.known_joint.realisations import means_over_bands
 from model_bound import model_bound
 
 CASES = ("3.1", "3.2", "3.3", "4.3.1")
@@ -73,7 +72,7 @@ def of_bands(case, exact, gamma):
     """Parameters by mean, median and inverse-variance mean over the bands, shape (3, 2 n)."""
     k, variance = lines_of_joint(gamma)
     bands, found = case.band_sets[0], []
-    found.append(means_over_bands(exact, k[None], bands)[0])
+    found.append(bands.means(exact.freq_hz, k))
     median, weighted = np.empty((2, 2 * exact.n))
     for p, own in enumerate(bands.bands.values()):
         inside, d = jf.in_bands(exact.freq_hz, own), p % exact.n

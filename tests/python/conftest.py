@@ -17,7 +17,7 @@ from filelock import FileLock
 
 import jointfrf as jf
 from installed_library import installed_library  # noqa: F401
-from jointfrf.workbench.cases import catalogue
+from jointfrf.workbench.cases import run
 from jointfrf.workbench.cases.known_joint.compute import KnownJointResult
 from thinned_cases import DrawSome, compute_thinned
 
@@ -143,7 +143,7 @@ def thinned(once) -> Callable[[str], KnownJointResult]:
 @pytest.fixture
 def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave the pictures of a case empty: to draw them takes most of the time of a short one."""
-    monkeypatch.setattr(catalogue, "draw", DrawSome())
+    monkeypatch.setattr(run, "draw", DrawSome())
 
 
 @pytest.fixture

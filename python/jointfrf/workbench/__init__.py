@@ -3,7 +3,7 @@
 The core (all other packages of `jointfrf`) does not import the workbench. In reading order, each above the former:
 
 fe             matrices, nodes and modes of FE programs
-solids         solid bodies of eight-node bricks; the bolt with contact and preload
+solids         solid bodies of eight-node bricks
 structures     structures as tables of TOML
 amplitude      joints over amplitude: levels, free decays, friction laws
 planning       which channels and lines a test needs

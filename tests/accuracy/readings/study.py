@@ -24,7 +24,7 @@ from jointfrf.workbench.cases.known_joint.exact import (
     noise_stream,
 )
 from jointfrf.workbench.cases.known_joint.keys import ExpectedErrors, KnownJointCase
-from jointfrf.workbench.cases.known_joint.realisations import chunk_size, means_over_bands
+from jointfrf.workbench.cases.known_joint.realisations import chunk_size
 from jointfrf.workbench.cases.known_joint.regenerate import regenerate
 
 from .printed_values import ErrorQuantity, PrintedTable, printed_tables
@@ -133,7 +133,7 @@ def realise(task: DrawTask) -> list[Realised]:
                     task.exact, task.method, scale.pollute(task.h, moduli[scale.reference], numbers), "nan"
                 )
             for b, band_set in enumerate(task.band_sets):
-                theta[s, b, several] = means_over_bands(task.exact, k_joint, band_set)
+                theta[s, b, several] = band_set.means(task.exact.freq_hz, k_joint)
     return [_realised(task, own) for own in theta]
 
 

@@ -17,18 +17,19 @@ from msgspec import structs
 
 import jointfrf as jf
 from jointfrf.dofs import DIRECTIONS, rigid_motion
-from jointfrf.workbench.cases import catalogue
+from jointfrf.workbench.cases import run as case_run
 from jointfrf.workbench.cases.bolted_lap import frfs
+from jointfrf.workbench.cases.bolted_lap.contact import ContactLaw
 from jointfrf.workbench.cases.bolted_lap.frfs import resonance_errors, resonances
+from jointfrf.workbench.cases.bolted_lap.lap import LapDivisions, bolted_lap
+from jointfrf.workbench.cases.bolted_lap.preload import preload
 from jointfrf.workbench.cases.bolted_lap.results import build_summary, build_tables
 from jointfrf.workbench.cases.bolted_lap.routes import DOFS, FivePoints, both_sides, measured_entries
-from jointfrf.workbench.cases.catalogue import CaseOutput, find_case, read_case, run_case
+from jointfrf.workbench.cases.catalogue import find_case, read_case
+from jointfrf.workbench.cases.run import CaseOutput, run_case
 from jointfrf.workbench.cli import run
 from jointfrf.workbench.cli.main import main
 from jointfrf.workbench.report.draw import draw
-from jointfrf.workbench.solids.bolted_lap import LapDivisions, bolted_lap
-from jointfrf.workbench.solids.contact import ContactLaw
-from jointfrf.workbench.solids.preload import preload
 from thinned_cases import DrawSome
 
 FOLDER = find_case("4.3.3")
@@ -198,7 +199,7 @@ def ran(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(frfs, "bolted_lap", partial(bolted_lap, divisions=COARSE))
         patch.setattr(run, "run_case", kept)
-        patch.setattr(catalogue, "draw", DrawSome(frozenset(["pressure-bolt"])))
+        patch.setattr(case_run, "draw", DrawSome(frozenset(["pressure-bolt"])))
         with (
             contextlib.redirect_stdout(said),
             contextlib.redirect_stderr(complained),
@@ -352,7 +353,8 @@ def test_routes_without_noise(ran):
         assert np.isfinite(lines).all()
     found = {r.found[:2]: r.found for r in ran.result.regenerated}
     for route, lines in k.items():
-        mean = jf.band_mean(ran.result.case.freq_hz, lines, {d: ran.result.case.bands_of(d) for d in DOFS}, DOFS)
+        own = {one.row: bands for one, bands in ran.result.case.bands.bands.items() if one.kind == "k"}
+        mean = jf.band_mean(ran.result.case.freq_hz, lines, own, DOFS)
         np.testing.assert_allclose(found[route, "band mean"].theta, np.concatenate(mean))
     fits = [f for f in found.values() if f.estimator == "compliance fit"]
     assert [f.route for f in fits] == ["central differences", "virtual points"]

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from jointfrf.choices import CASE_KINDS
 from jointfrf.errors import FileContentError
 from jointfrf.spelling import look_alike
 from jointfrf.toml.declared import keys_of
 from jointfrf.toml.documents import schema_of
 from jointfrf.toml.table import TomlTable, read_toml
 from jointfrf.workbench.cases import catalogue
-from jointfrf.workbench.cases.catalogue import KINDS, find_case, key_page, list_cases, read_case
+from jointfrf.workbench.cases.catalogue import find_case, key_page, kind_named, list_cases, read_case
 from jointfrf.workbench.cli.main import main
 from own_case import write_by_matrices, write_by_receptances
 from thinned_cases import DrawSome
@@ -59,7 +60,7 @@ def variations(folders, values):
     seen = set()
     for folder in folders:
         text = (folder / "case.toml").read_text()
-        kind = KINDS[tomllib.loads(text).get("kind", "known-joint")]
+        kind = kind_named(tomllib.loads(text).get("kind", "known-joint"))
         for (*where, word), key in list(places(tomllib.loads(text), (kind.keys,))):
             if id(key) in seen:
                 continue
@@ -181,7 +182,9 @@ def test_the_reference_is_printed_from_the_declared_keys(capsys):
     assert page == (ROOT / "docs/case-keys.md").read_text(encoding="utf-8") == key_page()
     headings = [line for line in page.splitlines() if line.startswith("#")]
     assert len(headings) == len(set(headings))
-    for _, key in places(tomllib.loads((find_case("4.3.1") / "case.toml").read_text()), (KINDS["known-joint"].keys,)):
+    for _, key in places(
+        tomllib.loads((find_case("4.3.1") / "case.toml").read_text()), (kind_named("known-joint").keys,)
+    ):
         assert f"`{key.shown.split(', ')[0]}`" in page
         assert f"| {key.takes} |" in page
     assert all(row.count("|") == 6 for row in page.splitlines() if row.startswith("|"))
@@ -191,7 +194,7 @@ def test_the_reference_is_printed_from_the_declared_keys(capsys):
 LONG = pytest.param("known-joint", marks=pytest.mark.long)
 
 
-@pytest.mark.parametrize("kind", [LONG if kind == "known-joint" else kind for kind in (*KINDS, "study")])
+@pytest.mark.parametrize("kind", [LONG if kind == "known-joint" else kind for kind in (*CASE_KINDS, "study")])
 def test_a_template_runs_as_it_stands(kind, tmp_path, capsys, monkeypatch, without_pictures):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("jointfrf.workbench.studies.result.draw", DrawSome())
@@ -225,9 +228,9 @@ def test_the_template_of_a_bolted_lap_runs_as_it_stands(tmp_path, monkeypatch, c
 def test_commented_keys_of_a_template_are_known(tmp_path, monkeypatch, capsys):
     """Every optional key of a template is one that the schema has."""
     monkeypatch.chdir(tmp_path)
-    for kind in KINDS:
+    for kind in CASE_KINDS:
         assert main(["new", kind, kind]) == 0
-        schema = schema_of(KINDS[kind].keys)
+        schema = schema_of(kind_named(kind).keys)
         known = {name for one in schema["$defs"].values() for name in one["properties"]}
         commented = [
             line.removeprefix("# ").partition(" = ")[0]

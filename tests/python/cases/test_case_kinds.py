@@ -6,28 +6,32 @@ import subprocess
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Annotated
 
 import numpy as np
 import pytest
 
 import jointfrf as jf
+from jointfrf.choices import CASE_KINDS
 from jointfrf.dofs import Parameter
 from jointfrf.errors import FileContentError
 from jointfrf.toml.declared import NotNegative, Positive, key
-from jointfrf.workbench.cases.catalogue import KINDS, find_case, list_cases, read_case, read_case_and_kind, run_case
+from jointfrf.workbench.cases import catalogue
+from jointfrf.workbench.cases.catalogue import find_case, kind_named, list_cases, read_case, read_case_and_kind
 from jointfrf.workbench.cases.keys import Case, CaseKeys, ExpectedKeys
-from jointfrf.workbench.cases.kind import CaseKind
+from jointfrf.workbench.cases.kind import CaseKind, EstimateColumn, EstimateGroup, Estimates
 from jointfrf.workbench.cases.known_joint.exact import exact_frfs
-from jointfrf.workbench.cases.known_joint.realisations import estimate_realisations
 from jointfrf.workbench.cases.known_joint.regenerate import regenerate, regenerate_all
+from jointfrf.workbench.cases.run import run_case
 from jointfrf.workbench.cases.workers import Workers
 from jointfrf.workbench.report.figure import Curve, Figure, Panel
 from jointfrf.workbench.report.table import Table
+from thinned_cases import estimate_realisations
 
 
 def test_every_case_names_a_kind_of_the_registry_or_none():
-    assert list(KINDS) == ["known-joint", "bolted-lap", "modelled-joint"]
+    assert [kind_named(name).name for name in CASE_KINDS] == ["known-joint", "bolted-lap", "modelled-joint"]
     kinds = {folder.name: read_case_and_kind(folder)[1].name for folder in list_cases()}
     assert kinds.pop("4.3.3-bolt") == "bolted-lap"
     assert kinds.pop("rubber-mount") == "modelled-joint"
@@ -75,12 +79,25 @@ def read(common, keys, expected):
     return Oscillator(**vars(common), mass=keys.mass, stiffness=keys.stiffness, expected=expected.stiffness)
 
 
-def compute(case, n_realisations, workers):
-    omega = 2 * np.pi * case.freq_hz
-    h = 1 / (case.stiffness - omega**2 * case.mass + 0j)
-    noisy = [jf.pollute(h[:, None, None], 0.01, "complex", case.seed, realisation=i) for i in range(n_realisations)]
-    found = workers.map(lambda one: float(np.mean(1 / one[:, 0, 0] + omega**2 * case.mass).real), noisy)
-    return Weighed(case, np.array(list(workers.counted(found, n_realisations))), h)
+def frfs(case):
+    return 1 / (case.stiffness - (2 * np.pi * case.freq_hz) ** 2 * case.mass + 0j)
+
+
+def groups(case, h, choice):
+    inertia = (2 * np.pi * case.freq_hz) ** 2 * case.mass
+
+    def source(first, count):
+        numbers = range(first, first + count)
+        noisy = [jf.pollute(h[:, None, None], 0.01, "complex", case.seed, realisation=i) for i in numbers]
+        return Estimates.without_intervals(np.array([[np.mean(1 / one[:, 0, 0] + inertia).real] for one in noisy]))
+
+    column = EstimateColumn("mean", "k_x", "N/m", case.stiffness, np.nan)
+    return [EstimateGroup("1 %", "mean", (column,), source)]
+
+
+def result(computed):
+    (found,) = computed.estimates()
+    return Weighed(computed.case, found.estimates.values[:, 0], computed.frfs)
 
 
 def tables(result):
@@ -98,7 +115,9 @@ OSCILLATOR = CaseKind(
     keys=OscillatorKeys,
     expected_keys=OscillatorExpected,
     read=read,
-    compute=compute,
+    frfs=frfs,
+    groups=groups,
+    result=result,
     tables=tables,
     figures=figures,
     summary=lambda result, tables: [
@@ -123,6 +142,13 @@ seed = 5
 
 
 @pytest.fixture
+def registered(monkeypatch):
+    """The kind is registered: its line of the registry and its package."""
+    monkeypatch.setattr(catalogue, "CASE_KINDS", (*CASE_KINDS, "oscillator"))
+    monkeypatch.setitem(sys.modules, "jointfrf.workbench.cases.oscillator", SimpleNamespace(KIND=OSCILLATOR))
+
+
+@pytest.fixture
 def folder(tmp_path):
     own = tmp_path / "one-mass"
     own.mkdir()
@@ -131,10 +157,11 @@ def folder(tmp_path):
     return own
 
 
+@pytest.mark.usefixtures("registered")
 def test_a_kind_of_ones_own_goes_through_the_same_door(folder, tmp_path):
     reported = []
     workers = Workers(progress=lambda done, total: reported.append((done, total)))
-    output = run_case(folder, tmp_path / "out", png=True, workers=workers, kinds={**KINDS, "oscillator": OSCILLATOR})
+    output = run_case(folder, tmp_path / "out", png=True, workers=workers)
     assert (output.case.mass, output.case.expected, output.case.realisations) == (2.0, 490.0, 40)
     assert output.result.stiffness == pytest.approx(500, rel=0.01)
     assert reported == [(i + 1, 40) for i in range(40)]
@@ -151,6 +178,7 @@ def test_a_kind_of_ones_own_goes_through_the_same_door(folder, tmp_path):
     assert [table.key for table in output.printed] == ["found"]
 
 
+@pytest.mark.usefixtures("registered")
 @pytest.mark.parametrize(
     ("file", "old", "new", "message"),
     [
@@ -164,7 +192,7 @@ def test_a_kind_of_ones_own_gets_the_same_sentences(folder, file, old, new, mess
     path = folder / file
     path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(FileContentError, match=message):
-        read_case(folder, {"oscillator": OSCILLATOR})
+        read_case(folder)
 
 
 def test_a_kind_that_is_not_registered_is_told(folder):
@@ -231,7 +259,9 @@ class PendulumKeys(CaseKeys, tag="pendulum"):
 KIND = CaseKind(
     keys=PendulumKeys,
     read=lambda common, keys, expected: common,
-    compute=lambda case, count, workers: case,
+    frfs=lambda case: None,
+    groups=lambda case, frfs, choice: [],
+    result=lambda computed: computed.case,
     tables=lambda result: [Table("arm", "Arm", ("quantity",), (("seen",),))],
     figures=lambda result: [],
     summary=lambda result, tables: [],

@@ -14,20 +14,19 @@ import jointfrf as jf
 from jointfrf.dofs import Parameter
 from jointfrf.identification.realisations import viscous_joints
 from jointfrf.substructuring.methods import STIFFNESS_METHODS
-from jointfrf.workbench.cases.catalogue import UnknownCaseError, find_case, list_cases, numbered, read_case, run_case
+from jointfrf.workbench.cases.catalogue import UnknownCaseError, find_case, list_cases, read_case
 from jointfrf.workbench.cases.comparison import verdict_sentence
 from jointfrf.workbench.cases.known_joint.exact import exact_frfs, noise_free_errors
+from jointfrf.workbench.cases.known_joint.expected import identified_rows
 from jointfrf.workbench.cases.known_joint.figures import build_figures
-from jointfrf.workbench.cases.known_joint.realisations import estimate_realisations
 from jointfrf.workbench.cases.known_joint.tables import (
     build_numbers,
     build_summary,
     build_tables,
-    identified_rows,
 )
-from jointfrf.workbench.cases.workers import Workers
+from jointfrf.workbench.cases.run import numbered, run_case
 from jointfrf.workbench.report.document import Document, Section, make_document
-from thinned_cases import PLANE, SOLID
+from thinned_cases import PLANE, SOLID, estimate_realisations
 
 NAMES = [*PLANE, *SOLID, "4.3.3-bolt"]
 #: Realisations of the plane cases of beams.
@@ -336,7 +335,7 @@ def test_tables_4_5_and_4_6_hold_with_one_factor_a_line():
     case = read_case(find_case("4.3.2"))
     common = next(noise for noise in case.noises if noise.block == 6)
     case = dataclasses.replace(case, freq_hz=case.freq_hz[1::2], noises=(common,))
-    found = {one.method: one for one in estimate_realisations(case, exact_frfs(case), 100, Workers())}
+    found = {one.method: one for one in estimate_realisations(case, exact_frfs(case), 100)}
     inside = {}
     for table in case.expected.identified:
         if table.noise == common.name or table.method == "decoupling-ss":
@@ -425,8 +424,10 @@ def test_sensitivities_are_drawn_where_a_parameter_moves_the_frf(solids):
     assert list(numbers) == expected
     assert [key.removeprefix("sensitivity-") for key in expected[:3]] == ["s-Fx-Fx", "s-Fy-Fy", "s-Fz-Fz"]
     # A change counts by its modulus, whatever its sign.
-    turned = {key: found._replace(change=-abs(found.change) + 0j) for key, found in result.sensitivities.items()}
-    again = make_figures(dataclasses.replace(result, sensitivities=turned))
+    actual = result.sensitive["actual"]
+    turned = {key: found._replace(change=-abs(found.change) + 0j) for key, found in actual.sensitivities.items()}
+    sensitive = result.sensitive | {"actual": dataclasses.replace(actual, sensitivities=turned)}
+    again = make_figures(dataclasses.replace(result, sensitive=sensitive))
     assert [f.key for f in again if f.key.startswith("sens")] == expected
 
 
@@ -526,7 +527,7 @@ def test_fits_of_a_realisation_do_not_depend_on_those_computed_with_it(monkeypat
     )
     exact = exact_frfs(case)
     together = estimate_realisations(case, exact, 3)
-    monkeypatch.setattr("jointfrf.workbench.cases.known_joint.realisations.chunk_size", lambda n_freq, entries: 1)
+    monkeypatch.setattr("jointfrf.workbench.cases.run._TASKS", 1)
     for a, b in zip(together, estimate_realisations(case, exact, 3), strict=True):
         np.testing.assert_array_equal(a.theta, b.theta)
 

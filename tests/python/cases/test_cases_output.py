@@ -16,8 +16,9 @@ from PIL import Image, ImageColor
 import jointfrf as jf
 from command import Finished, run_command
 from jointfrf.dofs import Parameter
-from jointfrf.workbench.cases.catalogue import CaseOutput, find_case, list_cases, numbered, run_case
+from jointfrf.workbench.cases.catalogue import find_case, list_cases
 from jointfrf.workbench.cases.known_joint.figures import build_figures
+from jointfrf.workbench.cases.run import CaseOutput, numbered, run_case
 from jointfrf.workbench.cli.main import main
 from jointfrf.workbench.report.axes import symbol
 from jointfrf.workbench.report.draw import STYLES, draw
@@ -70,7 +71,7 @@ def ran(tmp_path_factory):
     words = (chain, beams, wrong, behind, "--realisations", "4", "--jobs", "2", "--png", "--out", folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("jointfrf.workbench.cli.run.run_case", kept)
-        patch.setattr("jointfrf.workbench.cases.catalogue.draw", DrawSome(DRAWN))
+        patch.setattr("jointfrf.workbench.cases.run.draw", DrawSome(DRAWN))
         done = run_command("run", *words)
     return Ran(folder, done, outputs)
 
@@ -227,7 +228,7 @@ def test_tables_are_told_before_figures_are_drawn(tmp_path, monkeypatch):
     def stopped(figure, png):
         raise RuntimeError(f"{len(shown)} shown")
 
-    monkeypatch.setattr("jointfrf.workbench.cases.catalogue.draw", stopped)
+    monkeypatch.setattr("jointfrf.workbench.cases.run.draw", stopped)
     with pytest.raises(RuntimeError, match="1 shown"):
         run_case(find_case("3.1"), tmp_path, realisations=2, show=lambda case, tables: shown.append(tables))
     assert shown[0][0].title == "What fits"

@@ -6,10 +6,11 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from jointfrf.workbench.cases.catalogue import list_cases, numbered, read_case
+from jointfrf.workbench.cases.catalogue import list_cases, read_case
 from jointfrf.workbench.cases.known_joint.figures import build_figures
 from jointfrf.workbench.cases.known_joint.keys import KnownJointCase
 from jointfrf.workbench.cases.known_joint.tables import build_summary, build_tables
+from jointfrf.workbench.cases.run import numbered
 from jointfrf.workbench.report.document import Document, Picture, Section, make_document
 from jointfrf.workbench.report.draw import STYLES, draw, laid_out, shortened
 from jointfrf.workbench.report.figure import Curve, Figure, Interval, Panel

@@ -5,7 +5,8 @@ import json
 import pytest
 
 from jointfrf.errors import FileContentError
-from jointfrf.workbench.cases.catalogue import find_case, read_case, run_case
+from jointfrf.workbench.cases.catalogue import find_case, read_case
+from jointfrf.workbench.cases.run import run_case
 
 
 def small_case(tmp_path, *changes):

@@ -15,10 +15,12 @@ from scipy import sparse
 
 import jointfrf as jf
 from jointfrf.workbench.cases.catalogue import read_case
-from jointfrf.workbench.cases.known_joint.compute import compute
+from jointfrf.workbench.cases.known_joint import KIND
 from jointfrf.workbench.cases.known_joint.exact import exact_frfs
+from jointfrf.workbench.cases.known_joint.expected import identified_rows
 from jointfrf.workbench.cases.known_joint.figures import build_figures
-from jointfrf.workbench.cases.known_joint.tables import build_numbers, build_tables, identified_rows
+from jointfrf.workbench.cases.known_joint.tables import build_numbers, build_tables
+from jointfrf.workbench.cases.run import compute_case
 from own_case import BEAMS, RECEPTANCES, replace_tables, write_by_matrices, write_by_receptances, write_case
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -45,7 +47,7 @@ def test_matrices_give_the_case_of_the_beams(by_matrices):
         assert mine.dofs == theirs.dofs
         assert (sparse.csr_array(mine.stiffness) != sparse.csr_array(theirs.stiffness)).nnz == 0
     same_frfs(exact_frfs(case).h_c, exact_frfs(BEAMS).h_c)
-    result, wanted = (compute(replace(one, noises=one.noises[:1]), 20) for one in (case, BEAMS))
+    result, wanted = (compute_case(KIND, replace(one, noises=one.noises[:1]), 20) for one in (case, BEAMS))
     for joint in ("actual", "initial"):
         np.testing.assert_allclose(result.modes[joint].freq_hz, wanted.modes[joint].freq_hz, rtol=1e-9)
     for mine, theirs in zip(result.identified, wanted.identified, strict=True):
@@ -58,17 +60,19 @@ def test_receptances_give_the_case_of_the_beams(by_receptances):
     turned = np.ones(8)
     turned[2] = -1  # r is named against y
     same_frfs(exact_frfs(case).h_c, exact_frfs(BEAMS).h_c, turned[:, None] * turned)
-    result, wanted = (compute(replace(one, noises=one.noises[:1]), 20) for one in (case, BEAMS))
+    result, wanted = (compute_case(KIND, replace(one, noises=one.noises[:1]), 20) for one in (case, BEAMS))
     assert result.modes == {}
     for mine, theirs in zip(result.identified, wanted.identified, strict=True):
         np.testing.assert_allclose(mine.theta, theirs.theta, rtol=1e-6)
-    for key, sensitivity in wanted.sensitivities.items():
+    for key, sensitivity in wanted.sensitive["actual"].sensitivities.items():
         size = abs(sensitivity.change).max()
-        assert abs(abs(result.sensitivities[key].change) - abs(sensitivity.change)).max() < 1e-9 * size
+        assert (
+            abs(abs(result.sensitive["actual"].sensitivities[key].change) - abs(sensitivity.change)).max() < 1e-9 * size
+        )
 
 
 def test_receptances_leave_out_modes_and_nothing_else(by_receptances):
-    without, with_modes = (compute(one, 3) for one in (read_case(by_receptances), BEAMS))
+    without, with_modes = (compute_case(KIND, one, 3) for one in (read_case(by_receptances), BEAMS))
     tables, all_tables = ([table.key for table in build_tables(one)] for one in (without, with_modes))
     of_source = {"table-3-2", "section-3-2-figures-3-11-and-3-12"}  # expected.toml has been left behind
     assert set(all_tables) - set(tables) == {"natural-frequencies"} | of_source
@@ -93,7 +97,7 @@ def test_the_documented_case_runs(tmp_path, monkeypatch):
     command = [sys.executable, "-m", "jointfrf", *shlex.split("run my-case --realisations 5 --jobs 1")]
     subprocess.run(command, check=True, capture_output=True)
     found = json.loads((tmp_path / "results/my-case/results.json").read_text())["identified"]
-    wanted = identified_rows(compute(BEAMS, 5))
+    wanted = identified_rows(compute_case(KIND, BEAMS, 5))
     beside = {(row.noise, row.method, row.parameter.name): row.median for row in wanted}
     assert {(row["noise"], row["method"], row["parameter"]) for row in found} == set(beside)
     for row in found:

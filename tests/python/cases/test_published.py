@@ -144,7 +144,7 @@ def test_bands_of_the_first_estimate_are_nearer_to_the_regions_of_section_3_3(re
     """At the tip 200-400 and 600-800 Hz: k_Fy. The text speaks of the sensitivity that a user has before."""
     result = results["3.3-beams-1mm"]
     k_fy = Parameter.parse("k_Fy")
-    initial, actual = (proposals["s", k_fy] for proposals in (result.from_initial.proposals, result.proposals))
+    initial, actual = (one.proposals["s", k_fy] for one in result.sensitive.values())
     assert len(initial) == len(actual) == 2
     low, high = initial[0]
     assert abs(low - 200) < 5 < abs(actual[0][0] - 200)

@@ -15,9 +15,9 @@ from readings.study import ReadingsPlan, group_cases, study_readings
 import jointfrf as jf
 from jointfrf.workbench.cases.catalogue import find_case, read_case
 from jointfrf.workbench.cases.known_joint.exact import exact_frfs
-from jointfrf.workbench.cases.known_joint.realisations import estimate_realisations
 from jointfrf.workbench.cases.known_joint.regenerate import regenerate_all
 from jointfrf.workbench.cases.workers import Workers
+from thinned_cases import estimate_realisations
 
 #: Readings that `jointfrf.pollute` knows: kind, relative_to.
 POLLUTE = {

@@ -17,7 +17,8 @@ import pytest
 import jointfrf as jf
 from command import run_command
 from jointfrf.io.card_link import CardFormat
-from jointfrf.workbench.cases.catalogue import find_case, run_case
+from jointfrf.workbench.cases.catalogue import find_case
+from jointfrf.workbench.cases.run import run_case
 from jointfrf.workbench.report.chart import Chart
 from jointfrf.workbench.report.document import Document, Section, Words, make_document
 from jointfrf.workbench.report.draw import draw
@@ -56,7 +57,7 @@ def test_names_in_a_case_are_no_paths_no_orders_and_no_formulas(tmp_path, monkey
     deep.mkdir(parents=True)
     monkeypatch.chdir(deep)
     drawn = DrawSome(frozenset([f"identified-k_{DOF}", "noise"]))
-    monkeypatch.setattr("jointfrf.workbench.cases.catalogue.draw", drawn)
+    monkeypatch.setattr("jointfrf.workbench.cases.run.draw", drawn)
     case = case_of_a_stranger(tmp_path / "case")
     shown = run_command("run", case, "--out", "results", "--realisations", "2", "--jobs", "1")
     assert shown.returncode == 0, shown.stderr

@@ -22,9 +22,9 @@ import jointfrf as jf
 from command import run_command
 from jointfrf.workbench.cases.catalogue import find_case, read_case
 from jointfrf.workbench.cases.known_joint.exact import exact_frfs
-from jointfrf.workbench.cases.known_joint.realisations import estimate_realisations
 from jointfrf.workbench.studies.summary import ParameterSummary, study_figures
 from studied_case import CASE, DESIGN, WORDS, N, broken_off, doubled, same
+from thinned_cases import estimate_realisations
 
 
 @pytest.fixture(scope="module")
@@ -297,7 +297,11 @@ def test_command_says_what_the_study_holds(reference, tmp_path):
         (["3.11"], 2, "unknown case '3.11'; name a folder"),
         (["merge", "somewhere"], 2, "folders of parts or --out are missing"),
         (["merge", "somewhere", "--out", "there"], 1, "somewhere holds no study"),
-        (["3.1", "--estimator", "compliances"], 1, "unknown estimator 'compliances'; did you mean compliance?"),
+        (
+            ["3.1", "--estimator", "compliances"],
+            1,
+            "'compliances' in a case of kind known-joint; did you mean compliance?",
+        ),
         (["3.1", "--noise", "6 %"], 1, "unknown noise '6 %'; did you mean 5 %?"),
         (
             ["3.1", "--executor", "dusk"],

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jointfrf.workbench.solids.bolted_lap import (
+from jointfrf.workbench.cases.bolted_lap.contact import ContactLaw
+from jointfrf.workbench.cases.bolted_lap.lap import (
     ALUMINIUM,
     PROOF_STRENGTH,
     STRESS_AREA,
@@ -14,8 +15,7 @@ from jointfrf.workbench.solids.bolted_lap import (
     bolted_lap,
     preload_force,
 )
-from jointfrf.workbench.solids.contact import ContactLaw
-from jointfrf.workbench.solids.preload import preload
+from jointfrf.workbench.cases.bolted_lap.preload import preload
 
 FORCE = 22784.0
 COARSE = LapDivisions(across=4, rings=1, circles=0, head=1, nut=1)

@@ -11,12 +11,12 @@ from scipy.sparse.linalg import splu
 
 import jointfrf as jf
 from calculix_deck import deck, displacements, frequency_step, natural_frequencies, run, static_step, stored_matrices
-from jointfrf.workbench.solids.bolted_lap import BODIES, LapDivisions, bolted_lap
+from jointfrf.workbench.cases.bolted_lap.contact import ContactLaw
+from jointfrf.workbench.cases.bolted_lap.lap import BODIES, LapDivisions, bolted_lap
+from jointfrf.workbench.cases.bolted_lap.preload import preload
 from jointfrf.workbench.solids.brick import Material
 from jointfrf.workbench.solids.brick_beam import brick_beam
-from jointfrf.workbench.solids.contact import ContactLaw
 from jointfrf.workbench.solids.mesh import extrude, rectangle
-from jointfrf.workbench.solids.preload import preload
 
 CCX = shutil.which("ccx")
 pytestmark = pytest.mark.skipif(CCX is None, reason="CalculiX (ccx) is not on PATH")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
+from jointfrf.workbench.cases.bolted_lap.contact import ContactInterface, ContactLaw, solve_contact
 from jointfrf.workbench.solids.brick import Material, assemble_bricks
-from jointfrf.workbench.solids.contact import ContactInterface, ContactLaw, solve_contact
 from jointfrf.workbench.solids.mesh import Mesh, extrude, rectangle
 
 RIGID = ContactLaw(0.3, None, None)
@@ -72,26 +72,25 @@ def test_a_pressed_stack_has_uniform_pressure(friction, stiffness):
 
 
 @pytest.mark.parametrize("stiffness", [None, 2e13])
-def test_bars_that_close_a_gap(stiffness):
-    """A hanging bar, pulled down at its end onto a standing one; without Poisson effect, springs in series."""
+def test_bars_that_share_a_load(stiffness):
+    """A hanging bar, pressed down at its end onto a standing one; without Poisson effect, springs in series."""
     k, _, (bottom, below, above, top) = stack(Z, X, heights=(0.01, 0.03), poisson=0.0)
-    area, gap, force = node_areas(Z, X), 2e-6, 8e3
+    area, force = node_areas(Z, X), 8e3
     f = np.zeros(k.shape[0])
     f[3 * above + 1] = -force * area / area.sum()
-    pairs = {"gap": ContactInterface(below, above, area, np.full(20, gap))}
+    pairs = {"face": ContactInterface(below, above, area)}
     held = dofs(np.concatenate([bottom, top]), 0, 1, 2)
-    state = solve_contact(k, f, pairs, ContactLaw(0.3, stiffness, stiffness), fixed=held).interfaces["gap"]
+    state = solve_contact(k, f, pairs, ContactLaw(0.3, stiffness, stiffness), fixed=held).interfaces["face"]
 
     hanging, standing = 70e9 * SIDE**2 / 0.03, 70e9 * SIDE**2 / 0.01
     flexibility = 1 / standing + (0 if stiffness is None else 1 / (stiffness * SIDE**2))
-    # end = (force - carried) / hanging = gap + flexibility carried
-    carried = (force / hanging - gap) / (1 / hanging + flexibility)
+    # end = (force - carried) / hanging = flexibility carried
+    carried = (force / hanging) / (1 / hanging + flexibility)
     assert carried > 0
     assert state.normal_force == pytest.approx(carried, rel=1e-8)
 
-    # Too weak to close it.
-    with pytest.raises(ValueError, match="'gap' opens everywhere"):
-        solve_contact(k, 0.1 * f, pairs, RIGID, fixed=held)
+    with pytest.raises(ValueError, match="'face' opens everywhere"):
+        solve_contact(k, -f, pairs, RIGID, fixed=held)
 
 
 def plate_on_block():
@@ -179,23 +178,9 @@ def test_refusals():
     k, f, pairs, held = plate_on_block()
     both = {"p": pairs}
     with pytest.raises(ValueError, match="did not converge in 1 iterations"):
-        solve_contact(k, f, both, max_iterations=1, fixed=held)
+        solve_contact(k, f, both, ContactLaw(), max_iterations=1, fixed=held)
     with pytest.raises(ValueError, match="a body can move freely"):
-        solve_contact(k, f, both)
-    with pytest.raises(ValueError, match="max_iterations must be a whole number"):
-        solve_contact(k, f, both, max_iterations=0, fixed=held)
-    with pytest.raises(ValueError, match="load must not be zero"):
-        solve_contact(k, 0 * f, both, fixed=held)
-    with pytest.raises(ValueError, match="a node belongs to two pairs"):
-        solve_contact(k, f, {"p": pairs, "q": pairs}, fixed=held)
-    with pytest.raises(ValueError, match="'p' must have pairs, with an area"):
-        solve_contact(k, f, {"p": ContactInterface(pairs.lower, pairs.upper[1:], pairs.area)}, fixed=held)
-    with pytest.raises(ValueError, match="positive areas"):
-        solve_contact(k, f, {"p": ContactInterface(pairs.lower, pairs.upper, -pairs.area)}, fixed=held)
-    with pytest.raises(ValueError, match="a node is none of the"):
-        solve_contact(k, f, {"p": ContactInterface(pairs.lower, pairs.upper + 10_000, pairs.area)}, fixed=held)
-    with pytest.raises(ValueError, match="at least one interface"):
-        solve_contact(k, f, {}, fixed=held)
+        solve_contact(k, f, both, ContactLaw())
     with pytest.raises(ValueError, match="friction must not be negative"):
         ContactLaw(-0.1)
     with pytest.raises(ValueError, match="normal_stiffness must be positive"):

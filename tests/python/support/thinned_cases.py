@@ -5,7 +5,13 @@ from __future__ import annotations
 import dataclasses
 
 from jointfrf.workbench.cases.catalogue import find_case, read_case
-from jointfrf.workbench.cases.known_joint.compute import KnownJointResult, compute
+from jointfrf.workbench.cases.known_joint import KIND
+from jointfrf.workbench.cases.known_joint.compute import KnownJointResult
+from jointfrf.workbench.cases.known_joint.exact import Exact
+from jointfrf.workbench.cases.known_joint.keys import KnownJointCase
+from jointfrf.workbench.cases.known_joint.realisations import Identified, estimate_groups, identified_joints
+from jointfrf.workbench.cases.run import begin_estimates, compute_case
+from jointfrf.workbench.cases.workers import Workers
 from jointfrf.workbench.report.draw import Drawing, draw
 from jointfrf.workbench.report.figure import Figure
 
@@ -26,7 +32,12 @@ SOLID = list(_SHORT)[5:]
 def compute_thinned(name: str) -> KnownJointResult:
     step, count = _SHORT[name]
     case = read_case(find_case(name))
-    return compute(dataclasses.replace(case, freq_hz=case.freq_hz[::step]), count)
+    return compute_case(KIND, dataclasses.replace(case, freq_hz=case.freq_hz[::step]), count)
+
+
+def estimate_realisations(case: KnownJointCase, exact: Exact, count: int) -> list[Identified]:
+    """The joints that a run of the case identifies, without the rest of its results."""
+    return identified_joints(case, begin_estimates(estimate_groups(case, exact, None), count, Workers())())
 
 
 @dataclasses.dataclass(frozen=True)

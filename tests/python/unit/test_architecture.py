@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import jointfrf
+from jointfrf.choices import CASE_KINDS
 from packages import package_of
 
 PACKAGE = Path(jointfrf.__file__).parent
@@ -84,6 +85,15 @@ def test_the_core_does_not_import_the_workbench():
     of_core = {file: package for file, package in files().items() if not package.startswith(("workbench", "__main__"))}
     assert len(of_core) > 100
     assert not [file for file in of_core if any(one.startswith("jointfrf.workbench") for one in imported_modules(file))]
+
+
+def test_only_a_kind_of_case_imports_its_own_modules():
+    kinds = [f"jointfrf.workbench.cases.{name.replace('-', '_')}" for name in CASE_KINDS]
+    others = [f"{module_name(file)} imports {module}" for file in files() for module in imported_modules(file)
+              for kind in kinds if module.startswith(kind) and not module_name(file).startswith(kind)]  # fmt: skip
+    # `jointfrf plan` takes the exact FRFs of a case.
+    assert {one.split()[0] for one in others} <= {"jointfrf.workbench.cli.plan"}
+    assert not [one for one in others if "bolted_lap" in one]
 
 
 def test_no_modules_import_each_other_in_a_circle():

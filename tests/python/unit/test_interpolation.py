@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jointfrf.workbench.solids.bolted_lap import LapDivisions, bolted_lap
+from jointfrf.workbench.cases.bolted_lap.lap import LapDivisions, bolted_lap
 from jointfrf.workbench.solids.mesh import Mesh, extrude, holed_rectangle, interpolation
 
 SIGNS = np.array([[x, y, z] for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])

@@ -10,7 +10,8 @@ from scipy import sparse
 
 import jointfrf as jf
 from jointfrf.errors import FileContentError
-from jointfrf.workbench.cases.catalogue import find_case, read_case, run_case
+from jointfrf.workbench.cases.catalogue import find_case, read_case
+from jointfrf.workbench.cases.run import run_case
 from jointfrf.workbench.fe.matrix_formats import read_matrix
 from jointfrf.workbench.fe.nodes import read_nodes
 from own_case import write_case

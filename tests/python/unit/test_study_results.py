@@ -156,7 +156,7 @@ def test_columns_of_the_table(whole):
 
 
 def test_chunks_take_about_two_seconds_and_end_together():
-    group = EstimateGroup("noise", COLUMNS, Estimates.without_intervals, 5)
+    group = EstimateGroup("noise", "method", COLUMNS, Estimates.without_intervals, 5)
     schedule = Schedule([group], [[Span(3, 100_000)]], workers=2)
     chunks, taken = iter(schedule), []
     for chunk in chunks:

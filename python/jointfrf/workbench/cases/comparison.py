@@ -1,62 +1,137 @@
-"""Verdicts: on natural frequencies beside the expected ones, and how many of all tables fit."""
+"""Comparison of results with `expected.toml`: rows with verdicts, tables of them, and how many fit."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
+from jointfrf.kernel.arguments import FloatArray
 from jointfrf.workbench.cases.keys import ExpectedFrequencies
+from jointfrf.workbench.report.axes import percentiles
 from jointfrf.workbench.report.table import Cell, Table
 
-__all__ = ["agreement", "failing_rows", "frequency_table", "verdict", "verdict_sentence"]
+__all__ = [
+    "Compared",
+    "Ranked",
+    "agreement",
+    "compared_frequencies",
+    "compared_table",
+    "ranked",
+    "tables_of_sources",
+    "verdict_sentence",
+]
+
+_FITS, _DOES_NOT_FIT = "fits", "does not fit"
 
 
-def verdict(good: bool | None) -> str:
-    """Say whether something fits; nothing where that is not known."""
-    return "" if good is None else "fits" if good else "does not fit"
+class Compared(NamedTuple):
+    """A row of results, and whether it fits the expected number; None without such a number."""
+
+    cells: tuple[Cell, ...]
+    fits: bool | None
 
 
-def frequency_table(
+class Ranked(NamedTuple):
+    """An expected value among realisations.
+
+    Attributes
+    ----------
+    median, low, high : float
+        50, 2.5 and 97.5 percentile of the realisations.
+    percentile : float or None
+        Share of the realisations below the expected value, percent; None without an expected value.
+    fits : bool or None
+        Whether the expected value lies between `low` and `high`.
+    """
+
+    median: float
+    low: float
+    high: float
+    percentile: float | None
+    fits: bool | None
+
+
+def ranked(values: FloatArray, expected: float | None) -> Ranked:
+    """Return the percentiles of realisations, and the rank of an expected value among them."""
+    low, median, high = percentiles(values)
+    if expected is None:
+        return Ranked(median, low, high, None, None)
+    return Ranked(median, low, high, float((values < expected).mean() * 100), low <= expected <= high)
+
+
+def compared_table(
+    key: str,
     title: str,
     columns: Sequence[str],
-    groups: Sequence[tuple[Sequence[Sequence[Cell]], Sequence[float], ExpectedFrequencies | None]],
+    rows: Iterable[Compared],
+    note: str = "",
+    percentages: tuple[str, ...] = (),
+) -> Table:
+    """Return the table of compared rows, with their verdicts in the last column."""
+    own = list(rows)
+    words = {True: _FITS, False: _DOES_NOT_FIT, None: ""}
+    cells = tuple((*row.cells, words[row.fits]) for row in own)
+    failing = tuple(i for i, row in enumerate(own) if row.fits is not None and not row.fits)
+    return Table(key, title, (*columns, ""), cells, failing, note, percentages)
+
+
+def tables_of_sources(
+    what: str,
+    columns: Sequence[str],
+    rows: Iterable[tuple[str, Compared]],
+    note: str,
+    percentages: tuple[str, ...] = (),
+) -> list[Table]:
+    """Return one table for each source of expected numbers; its title is the source, then `what`."""
+    by_source: dict[str, list[Compared]] = {}
+    for source, row in rows:
+        by_source.setdefault(source, []).append(row)
+    return [
+        compared_table(
+            re.sub(r"[^a-z0-9]+", "-", source.lower()).strip("-"), source[:1].upper() + source[1:] + what, columns,
+            own, note, percentages,
+        )
+        for source, own in by_source.items()
+    ]  # fmt: skip
+
+
+def compared_frequencies(
+    title: str,
+    columns: Sequence[str],
+    groups: Iterable[tuple[Sequence[tuple[Cell, ...]], Sequence[float], ExpectedFrequencies | None]],
     note: str,
 ) -> Table:
-    """Build the table of natural frequencies beside the expected ones.
+    """Return the table of natural frequencies next to the expected ones.
 
     Parameters
     ----------
     title : str
     columns : sequence of str
-        What names a mode.
-    groups : sequence of (names, frequencies, expected)
-        Modes: the cells that name each, their frequencies in Hz, and what is known of them.
+        Headings of the cells that name a mode.
+    groups : iterable of (names, frequencies, expected)
+        Modes: the cells that name each, their frequencies in Hz, and the expected frequencies.
     note : str
 
     Returns
     -------
     Table
     """
-    cells: list[tuple[Cell, ...]] = []
+    rows = []
     for names, frequencies, expected in groups:
+        known = () if expected is None else expected.values
         for i, (name, freq) in enumerate(zip(names, frequencies, strict=True)):
-            known = difference = good = None
-            if expected is not None and i < len(expected.values):
-                known = expected.values[i]
-                difference = (freq / known - 1) * 100
-                good = abs(difference) <= expected.within_percent
-            cells.append((*name, freq, known, difference, verdict(good)))
-    all_columns = (*columns, "found, Hz", "expected, Hz", "difference, %", "")
-    failing = failing_rows(cells)
-    return Table("natural-frequencies", title, all_columns, tuple(cells), failing, note, percentages=("difference, %",))
-
-
-def failing_rows(cells: Sequence[Sequence[Cell]]) -> tuple[int, ...]:
-    """Return the rows whose last cell says that they do not fit."""
-    return tuple(i for i, row in enumerate(cells) if row[-1] == verdict(False))
+            if expected is None or i >= len(known):
+                rows.append(Compared((*name, freq, None, None), None))
+                continue
+            difference = (freq / known[i] - 1) * 100
+            rows.append(Compared((*name, freq, known[i], difference), abs(difference) <= expected.within_percent))
+    headings = (*columns, "found, Hz", "expected, Hz", "difference, %")
+    return compared_table("natural-frequencies", title, headings, rows, note, ("difference, %",))
 
 
 def agreement(tables: Sequence[Table]) -> Table:
-    """Build the table that counts the verdicts of others, for each noise and each set of bands by itself.
+    """Return the table that counts the verdicts of others, separately for each noise and each set of bands.
 
     Parameters
     ----------
@@ -67,24 +142,25 @@ def agreement(tables: Sequence[Table]) -> Table:
     Table
         How many rows fit, and which parameters do not.
     """
-    cells: list[tuple[Cell, ...]] = []
+    rows = []
     for table in tables:
         groups: dict[tuple[Cell, ...], list[tuple[Cell, bool]]] = {}
         for i, row in enumerate(table.rows):
             named = dict(zip(table.columns, row, strict=True))
-            if named.get("", verdict(None)) != verdict(None):
+            if named.get(""):
                 own = groups.setdefault((named.get("noise"), named.get("bands")), [])
                 own.append((named.get("parameter"), i not in table.failing))
         for group, judged in groups.items():
             good = sum(fits for _, fits in judged)
             others = ", ".join(str(name) for name, fits in judged if name is not None and not fits)
-            cells.append((table.title, *group, f"{good} of {len(judged)}", others, verdict(good == len(judged))))
-    columns = ("table", "noise", "bands", "rows that fit", "parameters that do not", "")
-    return Table("agreement", "What fits", columns, tuple(cells), failing_rows(cells))
+            cells = (table.title, *group, f"{good} of {len(judged)}", others)
+            rows.append(Compared(cells, good == len(judged)))
+    columns = ("table", "noise", "bands", "rows that fit", "parameters that do not")
+    return compared_table("agreement", "What fits", columns, rows)
 
 
 def verdict_sentence(summary: Sequence[Table]) -> str:
-    """Say how many of the comparisons counted by `agreement` fit, and in which tables others do not; "" without any."""
+    """Return how many of the comparisons counted by `agreement` fit, and the tables of the rest; "" without any."""
     table = next((one for one in summary if one.key == "agreement" and one.rows), None)
     if table is None:
         return ""

@@ -222,6 +222,29 @@ class BandSet:
     name: str
     bands: dict[Parameter, list[Band]]
 
+    def means(self, freq_hz: FloatArray, k_joint: ComplexArray) -> FloatArray:
+        """Return the means of Re K* (stiffness) and of Im K*/w (damping), each parameter over its own bands.
+
+        Parameters
+        ----------
+        freq_hz : ndarray, shape (n_freq,)
+            Hz.
+        k_joint : ndarray, shape (..., n_freq, n, n)
+            K*(w) of any number of realisations, N/m.
+
+        Returns
+        -------
+        ndarray, shape (..., 2 n)
+            Stiffness of all DOFs, then damping.
+        """
+        n = k_joint.shape[-1]
+        found = []
+        for p, bands in enumerate(self.bands.values()):
+            inside = in_bands(freq_hz, bands)
+            lines = k_joint[..., inside, p % n, p % n]
+            found.append((lines.real if p < n else lines.imag / (2 * np.pi * freq_hz[inside])).mean(axis=-1))
+        return np.stack(found, axis=-1)
+
 
 class BandKeys(Keys):
     """Sensitive bands over which the estimates of K* are averaged."""

@@ -1,4 +1,4 @@
-"""What a kind of case consists of: keys, computing, tables, figures, what a study computes."""
+"""Parts of a kind of case: keys, FRFs, methods, tables and figures; the same parts serve studies."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ from jointfrf.workbench.report.table import Table
 
 __all__ = [
     "CaseKind",
+    "Computed",
     "EstimateColumn",
     "EstimateGroup",
     "Estimates",
     "Estimator",
+    "GroupEstimates",
     "Pollution",
     "RealisationSource",
     "StudyChoice",
@@ -29,14 +31,14 @@ __all__ = [
 
 
 class Estimates(NamedTuple):
-    """What realisations gave, a row each; NaN where one gave nothing.
+    """Estimates of realisations, one row each; NaN in the row of a realisation that failed.
 
     Attributes
     ----------
     values : ndarray, shape (count, n_columns)
         In the units of the columns.
     low, high : ndarray, shape (count, n_columns)
-        Limits of the intervals of 95 %; NaN where there are none.
+        Limits of the intervals of 95 %; NaN without intervals.
     """
 
     values: FloatArray
@@ -67,9 +69,9 @@ class EstimateColumn:
     ----------
     estimator, parameter, unit : str
     actual : float
-        NaN where it is not known.
+        NaN if it is unknown.
     bound : float
-        Least standard deviation of an unbiased estimate (Cramer-Rao), NaN where it is not known.
+        Least standard deviation of an unbiased estimate (Cramer-Rao), NaN if it is unknown.
     """
 
     estimator: str
@@ -85,28 +87,37 @@ class EstimateGroup:
 
     Attributes
     ----------
-    noise : str
-        Name of the noise.
+    noise, method : str
+        Names.
     columns : tuple of EstimateColumn
     source : callable
         Gives the estimates of realisations, see `RealisationSource`.
     side_by_side : int
         Realisations that are best computed in one call.
+    details : callable, optional
+        Called like `source`, in its place for the report of a case: it also returns a list, with one object for each
+        realisation that has further results (K* line by line, for figures).
     """
 
     noise: str
+    method: str
     columns: tuple[EstimateColumn, ...]
     source: RealisationSource
     side_by_side: int = 1
+    details: Callable[[int, int], tuple[Estimates, list[Any]]] | None = None
 
 
-#: Noise of the user: exact FRFs, seed and number of the realisation to FRFs with noise.
-Pollution = Callable[[ComplexArray, int, int], ComplexArray]
+class GroupEstimates(NamedTuple):
+    """Estimates of all realisations of a group, and the further results of some; see `EstimateGroup`."""
+
+    group: EstimateGroup
+    estimates: Estimates
+    details: list[Any]
 
 
 @dataclass(frozen=True)
 class StudyChoice:
-    """What of a case is studied.
+    """Selection of noises and estimators of a case for a study.
 
     Attributes
     ----------
@@ -126,6 +137,10 @@ class StudyChoice:
     own_noises: Mapping[str, Pollution] = field(default_factory=dict)
 
 
+#: Noise of the user: exact FRFs, seed and number of the realisation to FRFs with noise.
+Pollution = Callable[[ComplexArray, int, int], ComplexArray]
+
+
 def chosen_noises(noises: Sequence[Noise], choice: StudyChoice) -> list[Noise]:
     """Return the noises of a case that a study takes.
 
@@ -142,55 +157,89 @@ def chosen_noises(noises: Sequence[Noise], choice: StudyChoice) -> list[Noise]:
 
 
 CaseT = TypeVar("CaseT", bound=Case)
+FrfsT = TypeVar("FrfsT")
 ResultT = TypeVar("ResultT")
 
 
+@dataclass(frozen=True)
+class Computed(Generic[CaseT, FrfsT]):
+    """A case whose realisations are under way.
+
+    Attributes
+    ----------
+    case : Case
+    frfs : object
+        FRFs without noise, as `CaseKind.frfs` returned them.
+    n_realisations : int
+    estimates : callable
+        Waits for the estimates of all groups.
+    workers : Workers
+        Processes that share further work.
+    """
+
+    case: CaseT
+    frfs: FrfsT
+    n_realisations: int
+    estimates: Callable[[], list[GroupEstimates]]
+    workers: Workers
+
+
 @dataclass(frozen=True, kw_only=True)
-class CaseKind(Generic[CaseT, ResultT]):
-    """A kind of case: all that is needed to read one, run it and show what it yields.
+class CaseKind(Generic[CaseT, FrfsT, ResultT]):
+    """A kind of case: how to read one, and the steps from its structure to tables (`jointfrf.workbench.cases.run`).
 
     Attributes
     ----------
     keys : type
-        What `case.toml` may hold; its ``tag`` is the value of the key `kind`.
+        Keys of `case.toml`; the ``tag`` is the value of the key `kind`.
     expected_keys : type
-        What `expected.toml` may hold.
+        Keys of `expected.toml`.
     read : callable
-        ``read(common, keys, expected)`` returns the case: `common` is what every case says, `keys` and `expected` are
-        what the files say, of the classes above. It raises FileContentError.
-    compute : callable
-        ``compute(case, n_realisations, workers)`` returns the result, a class of the kind.
+        ``read(common, keys, expected)`` returns the case: `common` is the part that all kinds share, `keys` and
+        `expected` are the files, of the classes above. It raises FileContentError.
+    frfs : callable
+        ``frfs(case)`` returns the FRFs of the structure without noise.
+    methods : tuple of str
+        Names of the estimators that a study may take.
+    takes_functions : bool
+        Whether a study may take estimators and noises of the user.
+    groups : callable
+        ``groups(case, frfs, choice)`` returns the methods that are applied to realisations of noise, see
+        `EstimateGroup`: the methods of a study, or without a choice (None) the methods of the report of the case.
+    result : callable
+        ``result(computed)`` returns the result, a class of the kind, from a `Computed`.
     tables : callable
         ``tables(result)``, in the order in which they are shown.
     figures : callable
         ``figures(result)``; their numbers in the source are added afterwards.
     summary : callable
-        ``summary(result, tables)`` returns short tables that say what came out.
+        ``summary(result, tables)`` returns short tables.
     numbers : callable
-        ``numbers(result)`` returns what `results.json` holds beside the common part and the tables.
-    groups : callable, optional
-        ``groups(case, choice)`` returns what a study of the case computes, see `EstimateGroup`. It raises ValueError.
+        ``numbers(result)`` returns the part of `results.json` that this kind adds.
     not_printed : tuple of str
         Keys of tables that the report has but that are not printed.
     headline : tuple of str
-        Keys of figures: the first of them that there is stands before the tables of the report.
+        Keys of figures: the first of them that exists is shown before the tables of the report.
 
     Examples
     --------
-    >>> from jointfrf.workbench.cases.catalogue import KINDS
-    >>> KINDS["bolted-lap"].name
-    'bolted-lap'
+    >>> from jointfrf.workbench.cases.catalogue import kind_named
+    >>> kind_named("bolted-lap").methods
+    ('ismm', 'compliance')
     """
 
     keys: type[CaseKeys]
     expected_keys: type[ExpectedKeys] = ExpectedKeys
     read: Callable[[Case, Any, Any], CaseT]
-    compute: Callable[[CaseT, int, Workers], ResultT]
+    frfs: Callable[[CaseT], FrfsT]
+    methods: tuple[str, ...] = ()
+    takes_functions: bool = False
+    groups: Callable[[CaseT, FrfsT, StudyChoice | None], list[EstimateGroup]]
+    result: Callable[[Computed[CaseT, FrfsT]], ResultT]
     tables: Callable[[ResultT], list[Table]]
     figures: Callable[[ResultT], list[Figure]]
     summary: Callable[[ResultT, list[Table]], list[Table]]
     numbers: Callable[[ResultT], dict[str, Any]]
-    groups: Callable[[CaseT, StudyChoice], list[EstimateGroup]] | None = None
     not_printed: tuple[str, ...] = ()
     headline: tuple[str, ...] = ()
 
@@ -198,3 +247,20 @@ class CaseKind(Generic[CaseT, ResultT]):
     def name(self) -> str:
         """The value of `kind` in `case.toml`."""
         return str(self.keys.__struct_config__.tag)
+
+    def study_groups(self, case: CaseT, choice: StudyChoice) -> list[EstimateGroup]:
+        """Return the estimates of a study of a case.
+
+        Raises
+        ------
+        ValueError
+            The case has no such noise or estimator, or takes no functions.
+        """
+        if not self.takes_functions and (choice.own_estimators or choice.own_noises):
+            raise ValueError(f"own estimator or noise in a case of kind {self.name}; use a case of kind known-joint")
+        for word in choice.estimators:
+            if word not in self.methods:
+                several = "one of " if len(self.methods) > 1 else ""
+                hint = did_you_mean(word, self.methods) or f"; use {several}{', '.join(self.methods)}"
+                raise ValueError(f"unknown estimator {word!r} in a case of kind {self.name}{hint}")
+        return self.groups(case, self.frfs(case), choice)

@@ -6,11 +6,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+from jointfrf.choices import CASE_KINDS
 from jointfrf.files import OwnFolder
 from jointfrf.toml.documents import key_template, schema_of
 from jointfrf.workbench.assembly_file.keys import AssemblyKeys, PartsKeys
 from jointfrf.workbench.assembly_file.template import TEMPLATE
-from jointfrf.workbench.cases.catalogue import KINDS
+from jointfrf.workbench.cases.catalogue import kind_named
 from jointfrf.workbench.cli.arguments.new import ASSEMBLY, STUDY, NewArguments
 from jointfrf.workbench.cli.usage import Output, UsageError
 
@@ -21,7 +22,7 @@ def run(args: NewArguments) -> int:
     """Carry out the command."""
     is_case, is_study = args.kind != ASSEMBLY, args.kind == STUDY
     name = "case" if is_case else "assembly"
-    top = KINDS[args.kind if args.kind in KINDS else next(iter(KINDS))].keys
+    top = kind_named(args.kind if args.kind in CASE_KINDS else CASE_KINDS[0]).keys
     keys = schema_of(top) if is_case else _of_either(schema_of(AssemblyKeys), schema_of(PartsKeys))
     schema = json.dumps(keys, indent=1) + "\n"
     if args.schema:

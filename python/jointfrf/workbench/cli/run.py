@@ -14,8 +14,9 @@ from threading import Lock
 
 from jointfrf.extras import check_extras
 from jointfrf.parallel.pool import available_cores
-from jointfrf.workbench.cases.catalogue import UnknownCaseError, find_case, list_cases, run_case
+from jointfrf.workbench.cases.catalogue import UnknownCaseError, find_case, list_cases
 from jointfrf.workbench.cases.keys import Case
+from jointfrf.workbench.cases.run import run_case
 from jointfrf.workbench.cases.workers import Workers, started_workers
 from jointfrf.workbench.cli.arguments.run import RunArguments, RunOneArguments
 from jointfrf.workbench.cli.progress import waiting

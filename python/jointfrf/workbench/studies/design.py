@@ -132,7 +132,7 @@ class StudyDesign:
         words = tuple(name for name in self.estimators if name not in own)
         return StudyChoice(tuple(self.noises), words, own, dict(self.own_noises))
 
-    def cases(self, folder: Path) -> Iterator[tuple[StudyPoint, Case, CaseKind[Any, Any]]]:
+    def cases(self, folder: Path) -> Iterator[tuple[StudyPoint, Case, CaseKind[Any, Any, Any]]]:
         """Read the case of each point.
 
         Raises

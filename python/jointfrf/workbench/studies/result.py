@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from jointfrf.extras import check_extras, import_extra
 from jointfrf.files import OwnFolder, written_whole
 from jointfrf.kernel.arguments import FloatArray, as_integer, check_choice
-from jointfrf.workbench.cases.catalogue import write_results
 from jointfrf.workbench.cases.kind import Estimates
+from jointfrf.workbench.cases.run import write_results
 from jointfrf.workbench.report.document import Document, Listing, Picture, Section
 from jointfrf.workbench.report.draw import draw
 from jointfrf.workbench.report.figure import Figure

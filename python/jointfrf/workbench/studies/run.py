@@ -271,10 +271,8 @@ def _prepared(folder: Path, design: StudyDesign, realisations: int | None) -> tu
     records: list[GroupRecord] = []
     seen = None
     for point, case, kind in design.cases(folder):
-        if kind.groups is None:
-            raise ValueError(f"a case of kind {kind.name} has no study; use a case of another kind")
         try:
-            own = kind.groups(case, design.choice)
+            own = kind.study_groups(case, design.choice)
         except ValueError as error:
             raise ValueError(f"{in_words(point)}: {error}" if point else str(error)) from error
         groups += own

@@ -1,4 +1,4 @@
-"""What a bolted lap joint yields: preloaded state, measured FRFs, the identified joint, regenerated FRFs."""
+"""Results of a bolted lap joint: preloaded state, measured FRFs, the identified joint, regenerated FRFs."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from msgspec import structs
 from numpy.typing import NDArray
 from scipy.interpolate import interp1d
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
-from jointfrf.spelling import did_you_mean
 from jointfrf.workbench.cases.bolted_lap.frfs import (
     TIP_DIRECTIONS,
     BeamFrfs,
@@ -24,11 +22,12 @@ from jointfrf.workbench.cases.bolted_lap.frfs import (
     solid_frfs,
 )
 from jointfrf.workbench.cases.bolted_lap.keys import BoltedLapCase
+from jointfrf.workbench.cases.bolted_lap.preload import PreloadedLap
 from jointfrf.workbench.cases.bolted_lap.routes import (
     DOFS,
+    ESTIMATORS,
     FivePoints,
     Found,
-    band_means,
     by_band_means,
     by_compliance_fit,
     fit_measured,
@@ -37,20 +36,25 @@ from jointfrf.workbench.cases.bolted_lap.routes import (
     route_lines,
 )
 from jointfrf.workbench.cases.keys import Noise, constant_joint
-from jointfrf.workbench.cases.kind import EstimateColumn, EstimateGroup, Estimates, StudyChoice, chosen_noises
-from jointfrf.workbench.cases.workers import Workers
-from jointfrf.workbench.solids.preload import PreloadedLap
+from jointfrf.workbench.cases.kind import (
+    Computed,
+    EstimateColumn,
+    EstimateGroup,
+    Estimates,
+    GroupEstimates,
+    StudyChoice,
+    chosen_noises,
+)
 
 __all__ = [
     "LINES",
     "BoltedLapResult",
-    "NoisyLap",
     "NoisyParameters",
     "RegeneratedTip",
     "Unmeasured",
-    "compute_bolted_lap",
+    "bolted_lap_result",
     "estimate_groups",
-    "identify_noisy",
+    "preloaded_frfs",
 ]
 
 #: K* of the reference points as it is, without constants for the joint.
@@ -77,7 +81,7 @@ class RegeneratedTip(NamedTuple):
 
 
 class Unmeasured(NamedTuple):
-    """What a known joint seems to be when some entries of exact FRFs are set to zero.
+    """Apparent parameters of a known joint when some entries of exact FRFs are set to zero.
 
     Attributes
     ----------
@@ -107,7 +111,7 @@ class NoisyParameters(NamedTuple):
     shift : ndarray, shape (r, n_peaks)
         Error (4.12) of every resonance, x then y.
     found : ndarray of bool, shape (r, n_peaks)
-        Where False, the shift is the limit of the search.
+        If False, the shift is the limit of the search.
     """
 
     noise: str
@@ -128,7 +132,7 @@ class BoltedLapResult:
     n_realisations : int
     state : PreloadedLap
     n_dofs : int
-        Of the solid model.
+        Number of DOFs of the solid model.
     natural_frequencies : ndarray, shape (n_modes,)
         Up to the last line, Hz.
     k_lines : dict
@@ -156,45 +160,24 @@ class BoltedLapResult:
     noisy: list[NoisyParameters]
 
 
-def compute_bolted_lap(case: BoltedLapCase, n_realisations: int, workers: Workers | None = None) -> BoltedLapResult:
-    """Run a case of a bolted lap joint.
+def preloaded_frfs(case: BoltedLapCase) -> SolidFrfs:
+    """Return the FRFs of the preloaded solid model."""
+    return solid_frfs(case, case.beams.length_b, True)
 
-    Parameters
-    ----------
-    case : BoltedLapCase
-    n_realisations : int
-    workers : Workers, optional
-        Processes that share the work; this process by default.
 
-    Returns
-    -------
-    BoltedLapResult
-
-    Raises
-    ------
-    ValueError
-        A geometry that is not possible, a joint that cannot carry the preload.
-    """
-    at_work = workers or Workers()
+def bolted_lap_result(computed: Computed[BoltedLapCase, SolidFrfs]) -> BoltedLapResult:
+    """Return the result of a case whose realisations are under way."""
+    case, solid, workers = computed.case, computed.frfs, computed.workers
     both = case.beams.lengths[1:]
-    solids = at_work.map(solid_frfs, [case] * 2, both, (True, False))
-    uncoupled = at_work.map(beam_frfs, [case] * 2, both)
-    solid, other = solids
-    beams = list(uncoupled)
+    transferred = workers.begin(solid_frfs, case, both[1], False)
+    uncoupled = workers.map(beam_frfs, [case] * 2, both)
+    other, beams = transferred(), list(uncoupled)
     peaks, other_peaks = (resonances(one.tip_hz, one.tip) for one in (solid, other))
-    # Processes repeat it with noise while the rest is done here.
-    repeated = [
-        (noise, at_work.map(identify_noisy, _realisations(case, noise, solid, n_realisations))) for noise in case.noises
-    ]
     k_lines = route_lines(solid.points, solid.channels, solid.reference)
     regenerated = _regenerated(case, solid, beams, k_lines, (peaks, other_peaks))
-    noisy: list[NoisyParameters] = []
-    for noise, parts in repeated:
-        done = list(at_work.counted(parts, n_realisations))
-        noisy += _noise_studies(noise, beams[0], peaks, done)
     return BoltedLapResult(
         case=case,
-        n_realisations=n_realisations,
+        n_realisations=computed.n_realisations,
         state=solid.state,
         n_dofs=len(solid.model.dofs),
         natural_frequencies=solid.natural_frequencies[solid.natural_frequencies <= case.freq_hz[-1]],
@@ -205,7 +188,7 @@ def compute_bolted_lap(case: BoltedLapCase, n_realisations: int, workers: Worker
         peaks=peaks,
         transferred_peaks=other_peaks,
         unmeasured=_unmeasured(case, beams[0]),
-        noisy=noisy,
+        noisy=[one for group in computed.estimates() for one in _noisy(group, beams[0], peaks)],
     )
 
 
@@ -255,7 +238,7 @@ def _unmeasured(case: BoltedLapCase, beams: BeamFrfs) -> list[Unmeasured]:
     found = []
     for name, h in masked.items():
         lines = joint_stiffness_lines(h)
-        theta = band_means(case, lines)
+        theta = case.bands.means(case.freq_hz, lines)
         # Without some of its entries gamma belongs to no joint whose cross terms are zero.
         fit = fit_measured(case.freq_hz, DOFS, h, np.eye(12))
         fitted = np.concatenate([fit.stiffness, fit.damping])
@@ -272,104 +255,73 @@ def _shift(case: BoltedLapCase, beams: BeamFrfs, theta: FloatArray) -> FloatArra
     return np.array([max(one, default=0.0) for one in own])
 
 
-class NoisyLap(NamedTuple):
-    """What a process needs for one noisy measurement.
-
-    Attributes
-    ----------
-    case : BoltedLapCase
-    noise : Noise
-    points : tuple of FivePoints
-    channels : ndarray, shape (n_freq, 30, 30)
-        Exact FRFs of the measured points, m/N.
-    number : int
-        Of the realisation.
-    """
-
-    case: BoltedLapCase
-    noise: Noise
-    points: tuple[FivePoints, FivePoints]
-    channels: ComplexArray
-    number: int
-
-
-def _realisations(case: BoltedLapCase, noise: Noise, solid: SolidFrfs, count: int) -> list[NoisyLap]:
-    return [NoisyLap(case, noise, solid.points, solid.channels, i) for i in range(count)]
-
-
-def identify_noisy(task: NoisyLap) -> list[Found]:
-    """Identify the joint from one realisation of the noise, by the estimators that the noise asks for."""
-    noise = task.noise
-    h = noise.pollute(task.channels, task.case.seed, task.number)
-    found = []
-    if "ismm" in noise.methods:
-        found += by_band_means(task.case, route_lines(task.points, h))
-    if "compliance" in noise.methods:
-        found += by_compliance_fit(task.case, task.points, h)
-    return found
-
-
-def _noise_studies(
-    noise: Noise, beams: BeamFrfs, peaks: list[Resonance], parts: list[list[Found]]
-) -> list[NoisyParameters]:
-    """Put the realisations of every route and estimator together, with the resonances they regenerate."""
+def _noisy(found: GroupEstimates, beams: BeamFrfs, peaks: list[Resonance]) -> list[NoisyParameters]:
+    """Return the realisations of every route of an estimator, with the resonances that they regenerate."""
+    estimator, routes = ESTIMATORS[found.group.method]
     studies = []
-    for same in zip(*parts, strict=True):
-        theta = np.array([found.theta for found in same])
+    for route, theta in zip(routes, np.split(found.estimates.values, len(routes), axis=1), strict=True):
         tips = (beams.tip(constant_joint(one, beams.freq_hz)) for one in theta)
         errors = [resonance_errors(beams.freq_hz, peaks, tip) for tip in tips]
-        shift, inside = (np.array([getattr(one, what) for one in errors]) for what in ("frequency", "found"))
-        studies.append(NoisyParameters(noise.name, same[0].route, same[0].estimator, theta, shift, inside))
+        shift, inside = (np.array([getattr(one, name) for one in errors]) for name in ("frequency", "found"))
+        studies.append(NoisyParameters(found.group.noise, route, estimator, theta, shift, inside))
     return studies
 
 
-#: What finds K* from the FRFs of a route: the method of the thesis, and the fit.
-_ESTIMATORS = ("ismm", "compliance")
 #: Half of the central 95 % of a normal distribution, in standard deviations.
 _REACH = 1.959963984540054
 
 
 @dataclass(frozen=True)
 class LapSource:
-    """Realisations of the measurement at five points a side."""
+    """Realisations of the measurement at five points a side, identified by one estimator by all of its routes.
 
-    measured: NoisyLap
+    Attributes
+    ----------
+    case : BoltedLapCase
+    noise : Noise
+    method : str
+        A key of `ESTIMATORS`.
+    points : tuple of FivePoints
+    channels : ndarray, shape (n_freq, 30, 30)
+        Exact FRFs of the measured points, m/N.
+    """
+
+    case: BoltedLapCase
+    noise: Noise
+    method: str
+    points: tuple[FivePoints, FivePoints]
+    channels: ComplexArray
 
     def __call__(self, first: int, count: int) -> Estimates:
         """Identify the joint from each realisation."""
-        numbers = range(first, first + count)
-        return Estimates(
-            *np.array([_row(identify_noisy(self.measured._replace(number=i))) for i in numbers]).swapaxes(0, 1)
-        )
+        return Estimates(*np.array([self._identified(number) for number in range(first, first + count)]).swapaxes(0, 1))
+
+    def _identified(self, number: int) -> FloatArray:
+        h = self.noise.pollute(self.channels, self.case.seed, number)
+        if self.method == "ismm":
+            found = by_band_means(self.case, route_lines(self.points, h))
+        else:
+            found = by_compliance_fit(self.case, self.points, h)
+        theta = np.concatenate([one.theta for one in found])
+        errors = np.concatenate([np.full(12, np.nan) if one.std_error is None else one.std_error for one in found])
+        return np.array([theta, theta - _REACH * errors, theta + _REACH * errors])
 
 
-def _row(found: list[Found]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    theta = np.concatenate([one.theta for one in found])
-    missing = np.full(len(found[0].theta), np.nan)
-    errors = np.concatenate([missing if one.std_error is None else one.std_error for one in found])
-    return theta, theta - _REACH * errors, theta + _REACH * errors
+def estimate_groups(case: BoltedLapCase, solid: SolidFrfs, choice: StudyChoice | None) -> list[EstimateGroup]:
+    """Return every noise with every estimator, each by all of its routes.
 
-
-def estimate_groups(case: BoltedLapCase, choice: StudyChoice) -> list[EstimateGroup]:
-    """Return what a study computes: every noise with every estimator, each by all of its routes.
-
-    The joint that the solid model has is not known: there are no actual values.
+    The parameters of the joint of the solid model are unknown: there are no actual values.
     """
-    if choice.own_estimators or choice.own_noises:
-        raise ValueError("own estimator or noise in a case of kind bolted-lap; use a case of kind known-joint")
-    for word in choice.estimators:
-        if word not in _ESTIMATORS:
-            hint = did_you_mean(word, _ESTIMATORS) or f"; use one of {', '.join(_ESTIMATORS)}"
-            raise ValueError(f"unknown estimator {word!r} in a case of kind bolted-lap{hint}")
-    solid = solid_frfs(case, case.beams.lengths[1], True)
+    choice = choice or StudyChoice()
     groups = []
     for noise in chosen_noises(case.noises, choice):
         for method in choice.estimators or noise.methods:
-            own = NoisyLap(case, structs.replace(noise, methods=(method,)), solid.points, solid.channels, 0)
-            columns = [
-                EstimateColumn(f"{one.estimator}, {one.route}", parameter.name, parameter.unit, np.nan, np.nan)
-                for one in identify_noisy(own)
+            estimator, routes = ESTIMATORS[method]
+            columns = tuple(
+                EstimateColumn(f"{estimator}, {route}", parameter.name, parameter.unit, np.nan, np.nan)
+                for route in routes
                 for parameter in case.parameters
-            ]
-            groups.append(EstimateGroup(noise.name, tuple(columns), LapSource(own)))
+            )
+            source = LapSource(case, noise, method, solid.points, solid.channels)
+            groups.append(EstimateGroup(noise.name, method, columns, source))
     return groups

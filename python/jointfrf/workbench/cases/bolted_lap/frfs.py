@@ -15,13 +15,13 @@ from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.bands import Band, has_peak, peak
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.substructuring.coupling import couple
+from jointfrf.workbench.cases.bolted_lap.contact import ContactLaw
 from jointfrf.workbench.cases.bolted_lap.keys import BoltedLapCase
+from jointfrf.workbench.cases.bolted_lap.lap import BoltedLap, bolted_lap
+from jointfrf.workbench.cases.bolted_lap.preload import PreloadedLap, preload
 from jointfrf.workbench.cases.bolted_lap.routes import DOFS, FivePoints
-from jointfrf.workbench.solids.bolted_lap import BoltedLap, bolted_lap
 from jointfrf.workbench.solids.brick_beam import Hole, brick_beam
-from jointfrf.workbench.solids.contact import ContactLaw
 from jointfrf.workbench.solids.mesh import Mesh, interpolation
-from jointfrf.workbench.solids.preload import PreloadedLap, preload
 from jointfrf.workbench.solids.solid import Patch, SolidModel, mean_motion
 
 __all__ = [

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from jointfrf.dofs import Parameter
-from jointfrf.frf.bands import Band
 from jointfrf.joint import Joint
 from jointfrf.toml.declared import Keys, NotNegative, Positive, key
+from jointfrf.workbench.cases.bolted_lap.lap import PROOF_STRENGTH, STRESS_AREA, Bolt, lap_bricks, preload_force
 from jointfrf.workbench.cases.keys import (
     BandKeys,
     BandSet,
@@ -22,7 +21,6 @@ from jointfrf.workbench.cases.keys import (
     check_noises,
     joints_of,
 )
-from jointfrf.workbench.solids.bolted_lap import PROOF_STRENGTH, STRESS_AREA, Bolt, lap_bricks, preload_force
 from jointfrf.workbench.solids.brick_beam import Preset
 from jointfrf.workbench.structures.keys import MaterialKeys
 from jointfrf.workbench.structures.substructures import BRICK, PRESET
@@ -137,10 +135,6 @@ class BoltedLapCase(Case, WithActualJoint):
     bands: BandSet
     noises: tuple[Noise, ...]
     expected: ExpectedFrequencies | None
-
-    def bands_of(self, dof: str) -> list[Band]:
-        """Bands of the stiffness and damping of a DOF, Hz."""
-        return self.bands.bands[Parameter.of_dof("k", dof)]
 
 
 def read_bolted_lap(common: Case, keys: BoltedLapKeys, expected: BoltedLapExpected) -> BoltedLapCase:

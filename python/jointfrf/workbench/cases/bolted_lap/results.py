@@ -12,7 +12,7 @@ from jointfrf.dofs import Parameter
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.workbench.cases.bolted_lap.compute import LINES, BoltedLapResult, RegeneratedTip
 from jointfrf.workbench.cases.bolted_lap.frfs import TIP_DIRECTIONS
-from jointfrf.workbench.cases.comparison import agreement, frequency_table
+from jointfrf.workbench.cases.comparison import agreement, compared_frequencies
 from jointfrf.workbench.report.axes import FREQUENCY, bulk_limits, parameter_label, parameter_lines, percentiles
 from jointfrf.workbench.report.figure import Curve, Figure, Interval, Level, Panel, Surface
 from jointfrf.workbench.report.receptance import ReceptanceCurve, receptance_panels
@@ -72,7 +72,7 @@ def _frequencies(result: BoltedLapResult) -> Table:
     expected, found = result.case.expected, result.natural_frequencies.tolist()
     names = [(str(i + 1),) for i in range(len(found))]
     title = "Natural frequencies of the preloaded assembly"
-    return frequency_table(title, ("mode",), [(names, found, expected)], expected.source if expected else "")
+    return compared_frequencies(title, ("mode",), [(names, found, expected)], expected.source if expected else "")
 
 
 def _identified(result: BoltedLapResult) -> Table:
@@ -298,7 +298,7 @@ def _lines(result: BoltedLapResult) -> Iterator[Figure]:
         for parameter, _ in parameters:
             lines = {route: _values(result, k, parameter) for route, k in result.k_lines.items()}
             curves = tuple(Curve(route, freq, values, _LINE_STYLES[route]) for route, values in lines.items())
-            shades = (("band", tuple(result.case.bands_of(parameter.row))),)
+            shades = (("band", tuple(result.case.bands.bands[parameter])),)
             levels = (Level("compliance fit, virtual points", fitted[parameter], "compliance"),)
             limits = bulk_limits(list(lines.values()), [fitted[parameter]])
             panels.append(

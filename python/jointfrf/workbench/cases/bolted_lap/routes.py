@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from jointfrf.channels.point_lines import difference_weights
 from jointfrf.channels.virtual_point import VirtualPoint, virtual_point, virtual_points
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning, IllConditionedWarning
-from jointfrf.frf.bands import band_mean
 from jointfrf.identification.identify import identify
 from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -24,9 +23,9 @@ from jointfrf.substructuring.modification import inverse_substructuring
 from jointfrf.workbench.cases.bolted_lap.keys import DOFS, BoltedLapCase
 
 __all__ = [
+    "ESTIMATORS",
     "FivePoints",
     "Found",
-    "band_means",
     "both_sides",
     "by_band_means",
     "by_compliance_fit",
@@ -38,6 +37,11 @@ __all__ = [
 
 #: Directions x, y, z.
 _AXES = np.eye(3)
+#: Names of the methods of a case in tables, and their routes to the FRFs of the joint DOFs.
+ESTIMATORS = {
+    "ismm": ("band mean", ("Measurements 1-4", "central differences", "virtual points", "multi-point")),
+    "compliance": ("compliance fit", ("central differences", "virtual points")),
+}
 
 
 @dataclass(frozen=True)
@@ -171,16 +175,9 @@ def _multi_point(points: tuple[FivePoints, FivePoints], h: ComplexArray) -> Comp
         return invert(multi_point_compliance(h, j, k, rank=6).equivalent)
 
 
-def band_means(case: BoltedLapCase, k_lines: ComplexArray) -> FloatArray:
-    """Means of Re K* and Im K*/w over the bands of each DOF, shape (12,)."""
-    dofs = case.joint.dofs
-    mean = band_mean(case.freq_hz, k_lines, {dof: case.bands_of(dof) for dof in dofs}, dofs)
-    return np.concatenate([mean.stiffness, mean.damping])
-
-
 def by_band_means(case: BoltedLapCase, k_lines: Mapping[str, ComplexArray]) -> list[Found]:
     """Constants of every route as means over bands."""
-    return [Found(route, "band mean", band_means(case, k)) for route, k in k_lines.items()]
+    return [Found(route, "band mean", case.bands.means(case.freq_hz, k)) for route, k in k_lines.items()]
 
 
 def by_compliance_fit(case: BoltedLapCase, points: tuple[FivePoints, FivePoints], h: ComplexArray) -> list[Found]:

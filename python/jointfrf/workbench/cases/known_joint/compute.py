@@ -1,30 +1,27 @@
-"""What a case yields: exact FRFs, natural frequencies, sensitivities, identified parameters, regenerated FRFs."""
+"""Results of a case of a known joint: modes, sensitivities, identified parameters, regenerated FRFs."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from jointfrf.dofs import Parameter
-from jointfrf.frf.bands import Band, in_bands
+from jointfrf.frf.bands import Band
 from jointfrf.identification.sensitivity import Sensitivity, propose_bands, sensitivity
 from jointfrf.joint import Joint
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
-from jointfrf.workbench.cases.known_joint.exact import Exact, NoiseFree, exact_frfs, noise_free_errors
+from jointfrf.kernel.arguments import ComplexArray
+from jointfrf.workbench.cases.kind import Computed
+from jointfrf.workbench.cases.known_joint.exact import Exact, NoiseFree, noise_free_errors
 from jointfrf.workbench.cases.known_joint.keys import KnownJointCase
 from jointfrf.workbench.cases.known_joint.modes import ModeShapes, modes_of_case
-from jointfrf.workbench.cases.known_joint.realisations import Identified, estimate_realisations
+from jointfrf.workbench.cases.known_joint.realisations import Identified, identified_joints
 from jointfrf.workbench.cases.known_joint.regenerate import (
     PrintedErrors,
     RegeneratedFrf,
     printed_errors,
     regenerate_all,
 )
-from jointfrf.workbench.cases.workers import Workers
 
-__all__ = ["KnownJointResult", "SensitiveBands", "compute", "contrast", "sensitive_bands"]
+__all__ = ["KnownJointResult", "SensitiveBands", "known_joint_result", "sensitive_bands"]
 
 
 @dataclass(frozen=True)
@@ -51,7 +48,7 @@ def sensitive_bands(case: KnownJointCase, exact: Exact, joint: Joint, h_c: Compl
     case : KnownJointCase
     exact : Exact
     joint : Joint
-        The actual joint, or its first estimate, which is what a user has.
+        The actual joint, or its first estimate.
     h_c : ndarray, shape (n_freq, 4 n, 4 n)
         Receptance of the assembly with this joint, DOFs as in `Exact`, m/N.
     """
@@ -68,33 +65,6 @@ def sensitive_bands(case: KnownJointCase, exact: Exact, joint: Joint, h_c: Compl
     return SensitiveBands(found, proposals)
 
 
-def contrast(freq_hz: FloatArray, change: ComplexArray, region: Band, regions: Sequence[Band]) -> float | None:
-    """How much more sensitive an FRF is inside a region than outside all of them, dB.
-
-    Parameters
-    ----------
-    freq_hz : ndarray, shape (n_freq,)
-        Hz.
-    change : ndarray, shape (n_freq,)
-        A row of `Sensitivity.change`.
-    region : (low, high)
-        Hz.
-    regions : sequence of (low, high)
-        All that the source names for the parameter, Hz.
-
-    Returns
-    -------
-    float or None
-        Median of the modulus over the lines inside, relative to that over the lines outside; medians, since resonances
-        and antiresonances are narrow. None where a median is zero, or no line is outside.
-    """
-    outside = ~in_bands(freq_hz, regions)
-    if not outside.any():
-        return None
-    within, without = (float(np.median(abs(change[lines]))) for lines in (in_bands(freq_hz, [region]), outside))
-    return float(20 * np.log10(within / without)) if within > 0 and without > 0 else None
-
-
 @dataclass(frozen=True)
 class KnownJointResult:
     """Results of a case of a known joint.
@@ -105,13 +75,10 @@ class KnownJointResult:
     exact : Exact
     n_realisations : int
     modes : dict
-        ``"actual"`` and ``"initial"`` joint to ModeShapes; empty without models.
-    sensitivities : dict
-        Key of an observed FRF to Sensitivity.
-    proposals : dict
-        Key of an observed FRF, and Parameter, to bands, Hz.
-    from_initial : SensitiveBands
-        Both with the first estimate in the place of the actual joint.
+        ``"initial"`` and ``"actual"`` joint to ModeShapes; empty without models.
+    sensitive : dict
+        ``"initial"`` and ``"actual"`` joint to SensitiveBands: before the identification, a user has the first
+        estimate only.
     identified : list of Identified
     regenerated : list of RegeneratedFrf
     printed : list of PrintedErrors
@@ -124,49 +91,30 @@ class KnownJointResult:
     exact: Exact
     n_realisations: int
     modes: dict[str, ModeShapes]
-    sensitivities: dict[str, Sensitivity]
-    proposals: dict[tuple[str, Parameter], list[Band]]
-    from_initial: SensitiveBands
+    sensitive: dict[str, SensitiveBands]
     identified: list[Identified]
     regenerated: list[RegeneratedFrf]
     printed: list[PrintedErrors]
     noise_free: dict[str, NoiseFree]
 
 
-def compute(case: KnownJointCase, n_realisations: int, workers: Workers | None = None) -> KnownJointResult:
-    """Run a case.
-
-    Parameters
-    ----------
-    case : KnownJointCase
-    n_realisations : int
-    workers : Workers, optional
-        Processes that share the work; this process by default.
-
-    Returns
-    -------
-    KnownJointResult
-    """
-    at_work = workers or Workers()
-    exact = at_work.begin(exact_frfs, case)()
-    # Processes do all this at the same time.
-    actual = at_work.begin(sensitive_bands, case, exact, case.joint, exact.h_c)
-    from_initial = at_work.begin(sensitive_bands, case, exact, case.initial, exact.h_initial)
-    modes = at_work.begin(modes_of_case, case)
-    printed = at_work.begin(printed_errors, case)
-    noise_free = at_work.begin(noise_free_errors, exact, case.joint.dynamic_stiffness(case.freq_hz))
-    identified = estimate_realisations(case, exact, n_realisations, at_work)
-    known = actual()
+def known_joint_result(computed: Computed[KnownJointCase, Exact]) -> KnownJointResult:
+    """Return the result of a case whose realisations are under way; processes do all this at the same time."""
+    case, exact, workers = computed.case, computed.frfs, computed.workers
+    initial = workers.begin(sensitive_bands, case, exact, case.initial, exact.h_initial)
+    actual = workers.begin(sensitive_bands, case, exact, case.joint, exact.h_c)
+    modes = workers.begin(modes_of_case, case)
+    printed = workers.begin(printed_errors, case)
+    noise_free = workers.begin(noise_free_errors, exact, case.joint.dynamic_stiffness(case.freq_hz))
+    identified = identified_joints(case, computed.estimates())
     return KnownJointResult(
         case=case,
         exact=exact,
-        n_realisations=n_realisations,
+        n_realisations=computed.n_realisations,
         modes=modes(),
-        sensitivities=known.sensitivities,
-        proposals=known.proposals,
-        from_initial=from_initial(),
+        sensitive={"initial": initial(), "actual": actual()},
         identified=identified,
-        regenerated=regenerate_all(exact, identified, case.observed, at_work),
+        regenerated=regenerate_all(exact, identified, case.observed, workers),
         printed=printed(),
         noise_free=noise_free(),
     )

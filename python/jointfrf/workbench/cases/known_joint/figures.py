@@ -13,10 +13,10 @@ from jointfrf.frf.noise_model import estimate_noise
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.workbench.cases.keys import Observed
 from jointfrf.workbench.cases.known_joint.compute import KnownJointResult
+from jointfrf.workbench.cases.known_joint.expected import identified_rows
 from jointfrf.workbench.cases.known_joint.modes import mode_panels
 from jointfrf.workbench.cases.known_joint.realisations import ALL_LINES, Identified
 from jointfrf.workbench.cases.known_joint.regenerate import RegeneratedFrf, regenerate
-from jointfrf.workbench.cases.known_joint.tables import identified_rows
 from jointfrf.workbench.report.axes import (
     FREQUENCY,
     bands_in_words,
@@ -150,7 +150,7 @@ def _noise_found(result: KnownJointResult) -> Iterator[Figure]:
 
 def _sensitivities(result: KnownJointResult) -> Iterator[Figure]:
     for one in result.case.observed:
-        reach = abs(result.sensitivities[one.key].change).max(axis=1)
+        reach = abs(result.sensitive["actual"].sensitivities[one.key].change).max(axis=1)
         for d, dof in enumerate(result.case.joint.dofs):
             if reach[d] < _UNMOVED * reach.max():
                 continue
@@ -176,7 +176,8 @@ def _varied_panels(result: KnownJointResult, one: Observed, d: int) -> tuple[Pan
 
 def _sensitivity_panel(result: KnownJointResult, one: Observed, stiffness: Parameter, damping: Parameter) -> Panel:
     """Draw the sensitivity of an FRF to stiffness and damping of a DOF, and the bands that follow."""
-    actual, initial = (found[one.key].in_db for found in (result.sensitivities, result.from_initial.sensitivities))
+    sensitive = result.sensitive
+    actual, initial = (sensitive[joint].sensitivities[one.key].in_db for joint in ("actual", "initial"))
     drawn = ((stiffness, actual, "", "stiffness"), (stiffness, initial, ", first estimate", "stiffness-initial"),
              (damping, actual, "", "damping"))  # fmt: skip
     curves = tuple(
@@ -190,8 +191,8 @@ def _sensitivity_panel(result: KnownJointResult, one: Observed, stiffness: Param
     )
     label = f"change of $H_{{{one.point * 2}}}$ per 1 %, dB"
     key = (one.key, stiffness)
-    strips = ((f"proposed for {symbol(stiffness)}", tuple(result.proposals[key])),
-              ("proposed from the first estimate", tuple(result.from_initial.proposals[key])))  # fmt: skip
+    strips = ((f"proposed for {symbol(stiffness)}", tuple(sensitive["actual"].proposals[key])),
+              ("proposed from the first estimate", tuple(sensitive["initial"].proposals[key])))  # fmt: skip
     return Panel("", FREQUENCY, label, curves, shades=_shades(result, stiffness), strips=strips)
 
 
@@ -324,31 +325,25 @@ def _method_panels(
 
 
 def _regenerated(result: KnownJointResult) -> Iterator[Figure]:
-    first_noise = result.case.noises[0].name
+    noise = result.case.noises[0].name
     names = (*(one.name for one in result.case.band_sets[:1]), ALL_LINES)
     for one in result.case.observed:
-        pairs = [
-            _regenerated_panels(result, r)
-            for r in result.regenerated
-            if r.observed == one and r.identified.noise == first_noise and r.identified.bands in names
-        ]
+        found = [r for r in result.regenerated
+                 if r.observed == one and r.identified.noise == noise and r.identified.bands in names]  # fmt: skip
+        columns = 1 if len(found) < 3 else 2
+        panels = side_by_side([_regenerated_panels(result, r) for r in found], columns)
         caption = f"Receptance of the assembly at {_place(result, one)}, regenerated from the identified parameters"
-        columns = 1 if len(pairs) < 3 else 2
-        yield Figure(f"regenerated-{one.key}", caption, side_by_side(pairs, columns), columns)
+        yield Figure(f"regenerated-{one.key}", caption, panels, columns)
         if one.bands:
-            yield Figure(f"zoom-{one.key}", f"{caption}, where errors are counted", _zoomed(result, one))
+            zoomed = _zoomed(result, one, [r for r in found if r.identified.method in _SINGLE] or found[:2])
+            yield Figure(f"zoom-{one.key}", f"{caption}, where errors are counted", zoomed)
 
 
-def _zoomed(result: KnownJointResult, one: Observed) -> tuple[Panel, ...]:
-    """One realisation of each method beside the actual FRF, in each band by itself."""
-    noise, freq = result.case.noises[0].name, result.exact.freq_hz
-    names = (*(own.name for own in result.case.band_sets[:1]), ALL_LINES)
-    found = [r for r in result.regenerated
-             if r.observed == one and r.identified.noise == noise and r.identified.bands in names]  # fmt: skip
-    found = [r for r in found if r.identified.method in _SINGLE] or found[:2]
+def _zoomed(result: KnownJointResult, one: Observed, found: list[RegeneratedFrf]) -> tuple[Panel, ...]:
+    """Draw one realisation of some methods and the actual FRF, in each band by itself."""
+    freq, panels = result.exact.freq_hz, []
     lines = [("actual", _curve(result, "actual", result.exact.h_c, one, "actual").h, "actual")]
     lines += [(_METHOD_NAMES[r.identified.method], r.first, r.identified.method) for r in found]
-    panels = []
     for low, high in one.bands:
         inside = (freq >= low) & (freq <= high)
         curves = tuple(Curve(name, freq[inside], np.abs(h[inside]), style) for name, h, style in lines)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,12 +15,12 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.substructuring.coupling import couple
 from jointfrf.workbench.cases.keys import Observed, constant_joint
 from jointfrf.workbench.cases.known_joint.exact import Exact, exact_frfs
-from jointfrf.workbench.cases.known_joint.keys import ExpectedErrors, ExpectedParameters, KnownJointCase, PrintedLines
+from jointfrf.workbench.cases.known_joint.keys import ExpectedErrors, KnownJointCase
 from jointfrf.workbench.cases.known_joint.realisations import Identified, chunk_size
 from jointfrf.workbench.cases.workers import Workers
 from jointfrf.workbench.report.axes import percentile_lines
 
-__all__ = ["PrintedErrors", "RegeneratedFrf", "printed_errors", "regenerate", "regenerate_all"]
+__all__ = ["PrintedErrors", "RegeneratedFrf", "peak_errors", "printed_errors", "regenerate", "regenerate_all"]
 
 #: Realisations whose FRFs are regenerated.
 _REGENERATED = 200
@@ -118,20 +118,20 @@ def _coupled(h_a: ComplexArray, h_b: ComplexArray, k_joint: ComplexArray, at: in
 def _with_errors(exact: Exact, h_exact: ComplexArray, identified: Identified, observed: Observed) -> RegeneratedFrf:
     h = regenerate(exact, identified.theta[:_REGENERATED], observed.point, observed.dof)
     bands = observed.bands or (None,)
-    amplitude, frequency = (
-        np.array([[_error(error, h_exact, one, exact.freq_hz, band) for one in h] for band in bands], np.float64)
-        for error in (amplitude_error, frequency_error)
+    errors = np.array([[peak_errors(h_exact, one, exact.freq_hz, band) for one in h] for band in bands])
+    return RegeneratedFrf(
+        identified, observed, percentile_lines(np.abs(h)), h[0].copy(), bands, *np.moveaxis(errors, 2, 0)
     )
-    return RegeneratedFrf(identified, observed, percentile_lines(np.abs(h)), h[0].copy(), bands, amplitude, frequency)
 
 
-def _error(
-    error: Callable[..., float], h_exact: ComplexArray, h: ComplexArray, freq_hz: FloatArray, band: Band | None
-) -> float:
-    """Error of a peak; NaN where there is none: what is largest at the edge of a band belongs to a peak elsewhere."""
+def peak_errors(h_exact: ComplexArray, h: ComplexArray, freq_hz: FloatArray, band: Band | None) -> tuple[float, float]:
+    """Return the errors (4.11) and (4.12) of a peak, percent; NaN if either FRF has no peak in the band.
+
+    A largest value at the edge of a band belongs to a peak elsewhere.
+    """
     if band is not None and not (has_peak(h_exact, freq_hz, band) and has_peak(h, freq_hz, band)):
-        return float("nan")
-    return error(h_exact, h, freq_hz, band)
+        return np.nan, np.nan
+    return amplitude_error(h_exact, h, freq_hz, band), frequency_error(h_exact, h, freq_hz, band)
 
 
 def regenerate_all(
@@ -147,12 +147,7 @@ def regenerate_all(
     return list(workers.map(_with_errors, [uncoupled] * len(pairs), h_exact, *zip(*pairs, strict=True)))
 
 
-#: Half of the last digit of the errors that are printed, percent.
-_LAST_DIGIT = 0.005
-
-
-@dataclass(frozen=True)
-class PrintedErrors:
+class PrintedErrors(NamedTuple):
     """Errors of an FRF regenerated from printed parameters.
 
     Attributes
@@ -160,20 +155,15 @@ class PrintedErrors:
     known : ExpectedErrors
         Which FRF, band and method, and the published errors.
     amplitude, frequency : float or None
-        Errors (4.11) and (4.12), percent; None where the exact or the regenerated FRF has no peak in the band.
+        Errors (4.11) and (4.12), percent; None if the exact or the regenerated FRF has no peak in the band.
     one_line : float
-        What an error (4.12) of one line is, percent.
-    amplitude_fits, frequency_fits : bool
-        Whether they lie as near the published ones as the case asks for; where the source has none, whether there is no
-        peak.
+        Error (4.12) of one line, percent.
     """
 
     known: ExpectedErrors
     amplitude: float | None
     frequency: float | None
     one_line: float
-    amplitude_fits: bool
-    frequency_fits: bool
 
 
 def printed_errors(case: KnownJointCase) -> list[PrintedErrors]:
@@ -186,57 +176,31 @@ def printed_errors(case: KnownJointCase) -> list[PrintedErrors]:
     Returns
     -------
     list of PrintedErrors
-        One for each published pair of errors for which all parameters are published; none where `expected.toml` names
+        One for each published pair of errors for which all parameters are published; none unless `expected.toml` names
         lines for it (`printed`).
     """
-    printed = case.expected.printed
-    wanted = [
-        (known, table) for known in case.expected.regenerated if (table := _printed_table(case, known)) is not None
-    ]
+    printed, names = case.expected.printed, [parameter.name for parameter in case.parameters]
+    parameters = {
+        (table.noise, table.method): [table.values[name] for name in names]
+        for table in reversed(case.expected.identified) if not set(names) - set(table.values)
+    }  # fmt: skip
+    wanted = [known for known in case.expected.regenerated if (known.noise, known.method) in parameters]
     if printed is None or not wanted:
         return []
     step, first = printed.step, float(case.freq_hz[0])
-    numbers = np.unique(np.concatenate([_lines(known, first, step) for known, _ in wanted]))
+    # Lines inside the bands, counted from the first line of the case.
+    ends = ((np.array(known.band) - first) / step for known in wanted)
+    numbers = np.unique(
+        np.concatenate([np.arange(np.ceil(low - 1e-9), np.floor(high + 1e-9) + 1) for low, high in ends])
+    )
     exact = exact_frfs(replace(case, freq_hz=np.round(first + numbers * step, 9)))
-    return [_errors(case, exact, known, table, printed) for known, table in wanted]
-
-
-def _printed_table(case: KnownJointCase, known: ExpectedErrors) -> ExpectedParameters | None:
-    """Return the published parameters that belong to published errors, if all of the joint are there."""
-    for table in case.expected.identified:
-        same = (table.noise, table.method) == (known.noise, known.method)
-        if same and all(parameter.name in table.values for parameter in case.parameters):
-            return table
-    return None
-
-
-def _lines(known: ExpectedErrors, first: float, step: float) -> FloatArray:
-    """Return the numbers of the lines inside a band, counted from the first line of the case."""
-    low, high = ((limit - first) / step for limit in known.band)
-    return np.arange(np.ceil(low - 1e-9), np.floor(high + 1e-9) + 1)
-
-
-def _errors(
-    case: KnownJointCase, exact: Exact, known: ExpectedErrors, table: ExpectedParameters, printed: PrintedLines
-) -> PrintedErrors:
-    observed = next(one for one in case.observed if one.key == known.observed)
-    theta = np.stack([case.actual, np.array([table.values[parameter.name] for parameter in case.parameters])])
-    actual, h = regenerate(exact, theta, observed.point, observed.dof, known.offset or ())
-    one_line = printed.step / peak(actual, exact.freq_hz, known.band)[1] * 100
-    amplitude = frequency = None
-    if has_peak(actual, exact.freq_hz, known.band) and has_peak(h, exact.freq_hz, known.band):
-        amplitude, frequency = (
-            error(actual, h, exact.freq_hz, known.band) for error in (amplitude_error, frequency_error)
-        )
-    return PrintedErrors(
-        known, amplitude, frequency, one_line,
-        _near(amplitude, known.amplitude, printed.amplitude_within_percent / 100 * (known.amplitude or 0)),
-        _near(frequency, known.frequency, printed.lines_within * one_line),
-    )  # fmt: skip
-
-
-def _near(found: float | None, published: float | None, within: float) -> bool:
-    """Whether an error is near the published one, up to its two printed digits; or both are missing."""
-    if found is None or published is None:
-        return found is published
-    return abs(found - published) <= within + _LAST_DIGIT
+    found = []
+    for known in wanted:
+        observed = next(one for one in case.observed if one.key == known.observed)
+        theta = np.array([case.actual, parameters[known.noise, known.method]])
+        actual, h = regenerate(exact, theta, observed.point, observed.dof, known.offset or ())
+        errors = peak_errors(actual, h, exact.freq_hz, known.band)
+        amplitude, frequency = (None if np.isnan(error) else error for error in errors)
+        one_line = step / peak(actual, exact.freq_hz, known.band)[1] * 100
+        found.append(PrintedErrors(known, amplitude, frequency, one_line))
+    return found

@@ -5,21 +5,30 @@ compute   realisations of the measurement, each fitted, for cases and for studie
 results   parameters beside their bound, residual test; stiffness over frequency, FRFs measured and fitted
 """
 
+from jointfrf.kernel.arguments import ComplexArray
 from jointfrf.workbench.cases.kind import CaseKind
-from jointfrf.workbench.cases.modelled_joint.compute import ModelledJointResult, compute_modelled, estimate_groups
+from jointfrf.workbench.cases.modelled_joint.compute import (
+    ESTIMATOR,
+    ModelledJointResult,
+    estimate_groups,
+    exact_frfs,
+    modelled_joint_result,
+)
 from jointfrf.workbench.cases.modelled_joint.keys import ModelledJointCase, ModelledJointKeys, read_modelled_joint
 from jointfrf.workbench.cases.modelled_joint.results import build_figures, build_numbers, build_summary, build_tables
 
 __all__ = ["KIND"]
 
-KIND: CaseKind[ModelledJointCase, ModelledJointResult] = CaseKind(
+KIND: CaseKind[ModelledJointCase, ComplexArray, ModelledJointResult] = CaseKind(
     keys=ModelledJointKeys,
     read=read_modelled_joint,
-    compute=compute_modelled,
+    frfs=exact_frfs,
+    methods=(ESTIMATOR,),
+    groups=estimate_groups,
+    result=modelled_joint_result,
     tables=build_tables,
     figures=build_figures,
     summary=build_summary,
     numbers=build_numbers,
-    groups=estimate_groups,
     headline=("stiffness",),
 )

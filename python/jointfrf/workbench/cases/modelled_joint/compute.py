@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,37 +17,38 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law import JointLaw
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
-from jointfrf.workbench.cases.kind import EstimateColumn, EstimateGroup, Estimates, StudyChoice
+from jointfrf.workbench.cases.kind import (
+    Computed,
+    EstimateColumn,
+    EstimateGroup,
+    Estimates,
+    GroupEstimates,
+    StudyChoice,
+)
 from jointfrf.workbench.cases.modelled_joint.keys import ModelledJointCase
-from jointfrf.workbench.cases.workers import Workers
 
 __all__ = [
-    "FittedDraw",
+    "ESTIMATOR",
+    "Draw",
     "ModelledJointResult",
-    "compute_modelled",
     "estimate_groups",
-    "fit_of_exact",
-    "fitted_draw",
+    "exact_frfs",
+    "modelled_joint_result",
+    "moving_stiffness",
 ]
 
 
-@dataclass(frozen=True)
-class FittedDraw:
-    """What one realisation gave.
+class Draw(NamedTuple):
+    """Further results of one realisation.
 
     Attributes
     ----------
-    values : dict of str to float
-    intervals : dict of str to (low, high)
-        Of 95 %.
     is_noise : bool
         Whether the residual is noise.
     stiffness : ndarray, shape (n_freq, n)
         K*(w) of the DOFs that have a law, N/m.
     """
 
-    values: dict[str, float]
-    intervals: dict[str, tuple[float, float]]
     is_noise: bool
     stiffness: ComplexArray
 
@@ -59,9 +60,8 @@ class ModelledJointResult:
     Attributes
     ----------
     case : ModelledJointCase
-    draws : tuple of FittedDraw
-    bound : dict of str to float
-        Standard deviations at the Cramer-Rao bound.
+    found : GroupEstimates
+        Parameters of the joint and of the models, with their bounds, and `Draw` objects.
     first : Fit
         The first realisation.
     measured : ndarray
@@ -71,8 +71,7 @@ class ModelledJointResult:
     """
 
     case: ModelledJointCase
-    draws: tuple[FittedDraw, ...]
-    bound: dict[str, float]
+    found: GroupEstimates
     first: Fit
     measured: ComplexArray
     constant: Fit
@@ -85,20 +84,22 @@ def moving_stiffness(joint: Joint | LawJoint, freq_hz: FloatArray) -> ComplexArr
     return np.array([law.stiffness(2 * np.pi * freq_hz) for law in laws.values()]).T
 
 
-def compute_modelled(case: ModelledJointCase, n_realisations: int, workers: Workers) -> ModelledJointResult:
-    """Simulate measurements and fit each."""
-    exact = case.truth.receptance(case.freq_hz, case.responses, case.forces)
-    measured = pollute(exact, case.noise, seed=case.seed)
-    bound = workers.begin(fit_of_exact, case, exact)
+def exact_frfs(case: ModelledJointCase) -> ComplexArray:
+    """Return the FRFs of the assembly between the measured DOFs without noise."""
+    return case.truth.receptance(case.freq_hz, case.responses, case.forces)
+
+
+def modelled_joint_result(computed: Computed[ModelledJointCase, ComplexArray]) -> ModelledJointResult:
+    """Return the result of a case whose realisations are under way."""
+    case, workers = computed.case, computed.workers
+    measured = pollute(computed.frfs, case.noise, seed=case.seed)
     first = workers.begin(_fit, case, case.believed, measured)
     constant = workers.begin(_fit, case, case.believed.with_joint(_constant(case.believed.joint)), measured)
-    draws = tuple(
-        workers.counted(workers.map(partial(fitted_draw, case, exact), range(n_realisations)), n_realisations)
-    )
-    return ModelledJointResult(case, draws, bound().std_error, first(), measured, constant())
+    (found,) = computed.estimates()
+    return ModelledJointResult(case, found, first(), measured, constant())
 
 
-def fit_of_exact(case: ModelledJointCase, exact: ComplexArray) -> Fit:
+def _fit_of_exact(case: ModelledJointCase, exact: ComplexArray) -> Fit:
     """Fit exact FRFs from the actual joint, with the noise known: standard errors are at the Cramer-Rao bound."""
     at_truth = case.believed.with_joint(case.truth.joint)
     return _fit(case, at_truth, exact, np.asarray((case.noise * abs(exact)) ** 2, float))
@@ -110,13 +111,6 @@ def _fit(case: ModelledJointCase, whole: Assembly, h: ComplexArray, noise: Float
         return identify_model(case.freq_hz, h, whole, case.responses, case.forces, noise=noise)
 
 
-def fitted_draw(case: ModelledJointCase, exact: ComplexArray, number: int) -> FittedDraw:
-    """Fit one realisation: that of seed + number."""
-    fit = _fit(case, case.believed, pollute(exact, case.noise, seed=case.seed + number))
-    stiffness = moving_stiffness(fit.joint, case.freq_hz)
-    return FittedDraw(fit.value, fit.confidence_interval(0.95), bool(fit.residual_is_noise), stiffness)
-
-
 def _constant(joint: LawJoint) -> LawJoint:
     """Return springs and dashpots in place of laws that depend on frequency."""
     laws: dict[tuple[str, str], JointLaw] = {
@@ -126,8 +120,8 @@ def _constant(joint: LawJoint) -> LawJoint:
     return LawJoint(laws, joint.rigid, joint.mass, joint.dofs)
 
 
-#: The name of its only estimator in studies.
-_ESTIMATOR = "model-fit"
+#: The only estimator.
+ESTIMATOR = "model-fit"
 
 
 @dataclass(frozen=True)
@@ -139,29 +133,36 @@ class ModelFitSource:
     names: tuple[str, ...]
 
     def __call__(self, first: int, count: int) -> Estimates:
-        """Fit each realisation."""
+        """Fit each realisation; the row of one that cannot be fitted is NaN."""
+        return self._fits(first, count, (ValueError, ArithmeticError))[0]
+
+    def details(self, first: int, count: int) -> tuple[Estimates, list[Draw]]:
+        """Fit each realisation; raise ValueError if one cannot be fitted."""
+        return self._fits(first, count, ())
+
+    def _fits(self, first: int, count: int, failures: tuple[type[Exception], ...]) -> tuple[Estimates, list[Draw]]:
+        case, draws = self.case, []
         found = np.full((3, count, len(self.names)), np.nan)
         for i in range(count):
             try:
-                fit = fitted_draw(self.case, self.exact, first + i)
-            except (ValueError, ArithmeticError):
-                continue  # it counts as failed
-            found[0, i] = [fit.values[name] for name in self.names]
-            found[1:, i] = np.array([fit.intervals[name] for name in self.names]).T
-        return Estimates(*found)
+                fit = _fit(case, case.believed, pollute(self.exact, case.noise, seed=case.seed + first + i))
+                intervals = fit.confidence_interval(0.95)
+            except failures:
+                continue
+            found[:, i] = np.array([(fit.value[name], *intervals[name]) for name in self.names]).T
+            draws.append(Draw(bool(fit.residual_is_noise), moving_stiffness(fit.joint, case.freq_hz)))
+        return Estimates(*found), draws
 
 
-def estimate_groups(case: ModelledJointCase, choice: StudyChoice) -> list[EstimateGroup]:
-    """Return what a study computes: the fit with models."""
-    if choice.own_estimators or choice.own_noises or choice.noises:
-        raise ValueError("own estimator or noise in a case of kind modelled-joint; use the noise of [measured]")
-    if any(word != _ESTIMATOR for word in choice.estimators):
-        raise ValueError(f"unknown estimator {choice.estimators[0]!r} in a case of kind modelled-joint; use model-fit")
-    exact = case.truth.receptance(case.freq_hz, case.responses, case.forces)
-    fit = fit_of_exact(case, exact)
-    names = tuple(fit.std_error)
-    columns = [
-        EstimateColumn(_ESTIMATOR, name, fit.unit(name), float(case.actual[name]), fit.std_error[name])
-        for name in names
-    ]
-    return [EstimateGroup(f"{100 * case.noise:g} %", tuple(columns), ModelFitSource(case, exact, names))]
+def estimate_groups(case: ModelledJointCase, exact: ComplexArray, choice: StudyChoice | None) -> list[EstimateGroup]:
+    """Return the fit with models."""
+    if choice is not None and choice.noises:
+        raise ValueError(f"unknown noise {choice.noises[0]!r} in a case of kind modelled-joint; set [measured] noise")
+    fit = _fit_of_exact(case, exact)
+    source = ModelFitSource(case, exact, tuple(fit.std_error))
+    columns = tuple(
+        EstimateColumn(ESTIMATOR, name, fit.unit(name), float(case.actual[name]), fit.std_error[name])
+        for name in source.names
+    )
+    details = source.details if choice is None else None
+    return [EstimateGroup(f"{100 * case.noise:g} %", ESTIMATOR, columns, source, details=details)]

@@ -11,6 +11,7 @@ from jointfrf.identification.fit_data import ModelData
 from jointfrf.identification.record import fit_to_dict
 from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.identification.result import Fit
+from jointfrf.workbench.cases.comparison import Compared, compared_table
 from jointfrf.workbench.cases.modelled_joint.compute import ModelledJointResult, moving_stiffness
 from jointfrf.workbench.report.figure import Curve, Figure, Panel, Ribbon
 from jointfrf.workbench.report.table import Cell, Table, number
@@ -30,28 +31,25 @@ def _parameters(result: ModelledJointResult) -> Table:
     """Parameters beside their bound, and how often intervals hold them."""
     from scipy.stats import binom
 
-    rows: list[tuple[Cell, ...]] = []
-    failing = []
-    for one in result.first.parameters:
-        actual = result.case.actual[one.name]
-        values = np.array([draw.values[one.name] for draw in result.draws])
-        low, high = np.array([draw.intervals[one.name] for draw in result.draws]).T
+    rows = []
+    for c, column in enumerate(result.found.group.columns):
+        actual, size = column.actual, abs(column.actual)
+        values, low, high = (array[:, c] for array in result.found.estimates)
         inside = int(np.count_nonzero((low <= actual) & (actual <= high)))
         fits = bool(binom.cdf(inside, len(values), 0.95) > _CHANCE)
         rmse = float(np.sqrt(np.mean((values - actual) ** 2)))
         limits = [float(np.percentile(values, share)) for share in (50, 2.5, 97.5)]
-        if not fits:
-            failing.append(len(rows))
-        rows.append((
-            one.name, one.unit, actual, *limits, 100 * rmse / abs(actual),
-            100 * result.bound[one.name] / abs(actual), 100 * inside / len(values), "fits" if fits else "does not fit",
-        ))  # fmt: skip
-    columns = ("parameter", "unit", "actual", "median", "2.5 %", "97.5 %", "RMSE, %", "bound, %", "coverage, %", "")
-    return Table(
-        "parameters", "Parameters of the joint and of the models", columns, tuple(rows), tuple(failing),
+        cells: tuple[Cell, ...] = (
+            column.parameter, column.unit, actual, *limits, 100 * rmse / size, 100 * column.bound / size,
+            100 * inside / len(values),
+        )  # fmt: skip
+        rows.append(Compared(cells, fits))
+    columns = ("parameter", "unit", "actual", "median", "2.5 %", "97.5 %", "RMSE, %", "bound, %", "coverage, %")
+    return compared_table(
+        "parameters", "Parameters of the joint and of the models", columns, rows,
         "Bound: Cramér-Rao, with the models and the priors. Coverage: how often the 95 % interval holds the actual "
         "value; it does not fit where so few are likely by less than 0.5 %.",
-        ("RMSE, %", "bound, %", "coverage, %"),
+        columns[6:],
     )  # fmt: skip
 
 
@@ -61,7 +59,7 @@ def _stiffness(result: ModelledJointResult) -> Table:
     exact = moving_stiffness(case.truth.joint, case.show_hz)
     constant = moving_stiffness(result.constant.joint, case.show_hz)
     at = [int(np.argmin(abs(case.freq_hz - f))) for f in case.show_hz]
-    found = np.array([draw.stiffness[at] for draw in result.draws])
+    found = np.array([draw.stiffness[at] for draw in result.found.details])
     rows: list[tuple[Cell, ...]] = []
     dofs = [a for a, b in case.truth.joint.laws if a == b]
     for d, dof in enumerate(dofs):
@@ -85,8 +83,8 @@ def _residuals(result: ModelledJointResult) -> Table:
     first, constant = result.first.test, result.constant.test
     assert isinstance(first, ResidualTest)
     assert isinstance(constant, ResidualTest)
-    count = len(result.draws)
-    alarms = sum(not draw.is_noise for draw in result.draws)
+    count = len(result.found.details)
+    alarms = sum(not draw.is_noise for draw in result.found.details)
     rows: list[tuple[Cell, ...]] = [
         ("laws of the case", f"{count - alarms} of {count}", first.ratio, _where(first.bands)),
         (
@@ -126,10 +124,10 @@ def build_summary(result: ModelledJointResult, tables: list[Table]) -> list[Tabl
 
 def build_numbers(result: ModelledJointResult) -> dict[str, Any]:
     """Return what `results.json` holds beside tables: the first realisation, and all values."""
-    names = list(result.first.value)
+    values = result.found.estimates.values.T.tolist()
     return {
         "first": fit_to_dict(result.first, lines=False),
-        "values": {name: [draw.values[name] for draw in result.draws] for name in names},
+        "values": {one.parameter: own for one, own in zip(result.found.group.columns, values, strict=True)},
     }
 
 
@@ -141,7 +139,7 @@ def build_figures(result: ModelledJointResult) -> list[Figure]:
 def _stiffness_figure(result: ModelledJointResult) -> Figure:
     case = result.case
     exact, constant = (moving_stiffness(j, case.freq_hz) for j in (case.truth.joint, result.constant.joint))
-    found = np.array([draw.stiffness for draw in result.draws])
+    found = np.array([draw.stiffness for draw in result.found.details])
     panels = []
     for d, dof in enumerate(a for a, b in case.truth.joint.laws if a == b):
         unit = "N m/rad" if is_rotation(dof) else "N/m"

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from jointfrf.kernel.arguments import FloatArray, as_count, as_not_negative, as_positive, as_real
+from jointfrf.kernel.arguments import FloatArray, as_not_negative, as_positive
 from jointfrf.models.factors import SYMMETRIC
 
 __all__ = ["ContactInterface", "ContactLaw", "InterfaceState", "Iteration", "Pairs", "solve_contact", "tie"]
@@ -51,7 +51,7 @@ class ContactLaw:
 
     Examples
     --------
-    >>> from jointfrf.workbench.solids.contact import ContactLaw
+    >>> from jointfrf.workbench.cases.bolted_lap.contact import ContactLaw
     >>> ContactLaw(friction=0.2)
     ContactLaw(friction=0.2, normal_stiffness=100000000000000.0, tangential_stiffness=10000000000000.0)
     """
@@ -77,19 +77,12 @@ class ContactInterface:
     lower, upper : ndarray of int, shape (n_pairs,)
         Nodes of the body on the side of lower y, and their partners on the body above, counted from 0.
     area : ndarray, shape (n_pairs,)
-        Of each pair, m^2.
-    gap : ndarray, shape (n_pairs,), optional
-        Distance along y before loading, m; zero by default.
+        Area of each pair, m^2.
     """
 
     lower: NDArray[np.int32]
     upper: NDArray[np.int32]
     area: FloatArray
-    gap: FloatArray | None = None
-
-    def gaps(self) -> FloatArray:
-        """Return the distance of all pairs before loading, m."""
-        return np.zeros(len(self.lower)) if self.gap is None else self.gap
 
 
 class Pairs:
@@ -104,27 +97,13 @@ class Pairs:
     """
 
     def __init__(self, interfaces: Mapping[str, ContactInterface], n: int) -> None:
-        if not interfaces:
-            raise ValueError("interfaces must name at least one interface")
-        for name, one in interfaces.items():
-            counts = {len(one.lower), len(one.upper), len(one.area), len(one.gaps())}
-            if len(counts) != 1 or counts == {0}:
-                raise ValueError(f"interfaces: {name!r} must have pairs, with an area and a gap for each")
-            if (one.gaps() < 0).any() or (one.area <= 0).any():
-                raise ValueError(f"interfaces: {name!r} must have positive areas and gaps that are not negative")
         ends = np.cumsum([len(one.lower) for one in interfaces.values()]).tolist()
         self.parts = {name: slice(a, b) for name, a, b in zip(interfaces, [0, *ends], ends, strict=False)}
         every = list(interfaces.values())
         self.lower = np.concatenate([one.lower for one in every]).astype(np.int64)
         self.upper = np.concatenate([one.upper for one in every]).astype(np.int64)
         self.area = np.concatenate([one.area for one in every])
-        self.gap = np.concatenate([one.gaps() for one in every])
         self.n = n
-        nodes = np.concatenate([self.lower, self.upper])
-        if np.unique(nodes).size != nodes.size:
-            raise ValueError("interfaces: a node belongs to two pairs")
-        if nodes.min() < 0 or 3 * nodes.max() + 2 >= n:
-            raise ValueError(f"interfaces: a node is none of the {n // 3} of the stiffness")
         self.up = 3 * self.upper[:, None] + np.arange(3)
         self.low = 3 * self.lower[:, None] + np.arange(3)
 
@@ -138,7 +117,7 @@ class Pairs:
         return tied
 
     def springs(self, law: ContactLaw, closed: BoolArray, sticking: BoolArray) -> sparse.csr_array:
-        """Return the stiffness of the pairs that are held by springs, (n, n)."""
+        """Return the stiffness of the springs between closed pairs, (n, n)."""
         stiffness = np.zeros((len(self.area), 3, 3))
         if law.normal_stiffness is not None:
             stiffness[closed, NORMAL, NORMAL] = law.normal_stiffness * self.area[closed]
@@ -173,7 +152,7 @@ def tie(pairs: Pairs, tied: BoolArray, fixed: ArrayLike = ()) -> tuple[sparse.cs
     Returns
     -------
     expansion : csr_array, shape (n, n_independent)
-        Of zeros and ones.
+        Zeros and ones.
     independent : ndarray of int, shape (n_independent,)
         These DOFs, ascending.
     """
@@ -194,7 +173,7 @@ def tie(pairs: Pairs, tied: BoolArray, fixed: ArrayLike = ()) -> tuple[sparse.cs
 
 @dataclass(frozen=True)
 class InterfaceState:
-    """What an interface carries, pair by pair.
+    """Forces and displacements of an interface, pair by pair.
 
     Attributes
     ----------
@@ -207,7 +186,7 @@ class InterfaceState:
     separation : ndarray, shape (n_pairs,)
         Distance along y, m; negative where closed pairs of finite stiffness overlap.
     slide : ndarray, shape (n_pairs, 2)
-        Of the upper node against the lower one along x and z, m.
+        Displacement of the upper node relative to the lower one along x and z, m.
     slip_ratio : ndarray, shape (n_pairs,)
         Shear stress over its limit mu p (4.1)-(4.2): 1 where slipping, 0 where open or without friction.
     """
@@ -253,7 +232,7 @@ class ContactSolution:
     Attributes
     ----------
     displacement : ndarray, shape (n,)
-        Of all DOFs.
+        Displacement of all DOFs.
     interfaces : dict of str to InterfaceState
     history : tuple of Iteration
     """
@@ -265,9 +244,9 @@ class ContactSolution:
 
 def solve_contact(
     stiffness: sparse.sparray,
-    load: ArrayLike,
+    load: FloatArray,
     interfaces: Mapping[str, ContactInterface],
-    law: ContactLaw | None = None,
+    law: ContactLaw,
     *,
     fixed: ArrayLike = (),
     max_iterations: int = 50,
@@ -278,14 +257,13 @@ def solve_contact(
     ----------
     stiffness : sparse array, shape (n, n)
         Symmetric, N/m: x, y, z of node 0, then of node 1, ...; other DOFs may follow.
-    load : array_like, shape (n,)
+    load : ndarray, shape (n,)
         N. It is applied in one step from the unloaded state.
     interfaces : mapping of str to ContactInterface
         No node may belong to two pairs.
-    law : ContactLaw, optional
-        ``ContactLaw()`` by default.
+    law : ContactLaw
     fixed : array_like of int
-        DOFs that are held.
+        DOFs that do not move.
     max_iterations : int
 
     Returns
@@ -295,19 +273,18 @@ def solve_contact(
     Raises
     ------
     ValueError
-        Arguments of wrong shape or range; a body that is held neither by supports nor by contact; an interface that
-        opens everywhere; no convergence.
+        A body is free to move, an interface opens everywhere, or the iteration does not converge.
 
     Notes
     -----
-    All pairs begin closed and sticking, which holds every body that touches a supported one. A closed pair in tension
+    All pairs begin closed and sticking, so a body that touches a supported one is supported. A closed pair in tension
     opens, an open one that overlaps closes (primal-dual active set). A sticking pair beyond the cone slips: its shear
     force is mu p against the sliding, solved for together with p, and its direction is found by Newton's method. A
     slipping pair that is pushed back sticks again. The load comes in one step, so its path is not traced: exact where
-    the contacts do not depend on the level of the load, as without gaps and slip.
+    the contacts do not depend on the level of the load, as without slip.
 
-    Slipping pairs are also held by springs of 1e-8 of the stiffness of a node, for bodies that only friction holds;
-    without slip there is no regularisation.
+    Springs of 1e-8 of the stiffness of a node act on slipping pairs, for bodies that only friction supports; without
+    slip there is no regularisation.
 
     Examples
     --------
@@ -315,23 +292,19 @@ def solve_contact(
 
     >>> import numpy as np
     >>> from jointfrf.workbench.solids.brick import Material, assemble_bricks
-    >>> from jointfrf.workbench.solids.contact import ContactInterface, solve_contact
+    >>> from jointfrf.workbench.cases.bolted_lap.contact import ContactInterface, ContactLaw, solve_contact
     >>> corners = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])
     >>> nodes = [[0.01 * x, y, 0.01 * z] for y in (0.0, 0.01, 0.01, 0.02) for x, z in corners]
     >>> k, _ = assemble_bricks(nodes, [range(8), range(8, 16)], Material(70e9, 0.0, 2700.0))
     >>> load = np.zeros(48)
     >>> load[37::3] = -100.0
     >>> faces = ContactInterface(np.arange(4, 8), np.arange(8, 12), np.full(4, 25e-6))
-    >>> found = solve_contact(k, load, {"faces": faces}, fixed=range(12)).interfaces["faces"]
+    >>> found = solve_contact(k, load, {"faces": faces}, ContactLaw(), fixed=range(12)).interfaces["faces"]
     >>> (found.pressure / 1e6).round(9).tolist()
     [4.0, 4.0, 4.0, 4.0]
     """
     k = sparse.csr_array(stiffness)
-    f = as_real("load", load, (k.shape[0],))
-    max_iterations = as_count("max_iterations", max_iterations)
-    if not f.any():
-        raise ValueError("load must not be zero everywhere")
-    problem = _Problem(k, f, Pairs(interfaces, k.shape[0]), law or ContactLaw(), np.asarray(fixed, np.int64))
+    problem = _Problem(k, load, Pairs(interfaces, k.shape[0]), law, np.asarray(fixed, np.int64))
     return problem.iterate(max_iterations)
 
 
@@ -390,12 +363,9 @@ class _Problem:
 
     def solve(self, contacts: _Contacts) -> tuple[FloatArray, float]:
         """Return the displacements with these contacts, and the forces left out of balance over the largest load."""
-        pairs, law, n = self.pairs, self.law, len(self.f)
+        pairs, law = self.pairs, self.law
         closed, sticking = contacts.closed, contacts.sticking()
         t, _ = tie(pairs, pairs.tied(law, closed, sticking), self.fixed)
-        gap = np.zeros(n)
-        gap[pairs.up[closed, NORMAL]] = pairs.gap[closed]
-        start = -gap if law.normal_stiffness is None else np.zeros(n)
         springs = pairs.springs(law, closed, sticking)
         k, f = self.k, self.f
         slips = closed & contacts.slipping
@@ -404,7 +374,7 @@ class _Problem:
             shear = self.friction_rows(contacts, slips)
             k, f = k + shear @ k, f + shear @ f
         matrix = sparse.csc_array(t.T @ (k + springs) @ t)
-        right = t.T @ (f - k @ start - springs @ (start + gap))
+        right = t.T @ f
         try:
             factors = sparse_linalg.splu(matrix, **SYMMETRIC)
             pivots = abs(factors.U.diagonal())
@@ -412,11 +382,9 @@ class _Problem:
         except RuntimeError:  # exactly singular
             regular = False
         if not regular:
-            raise ValueError(
-                "a body can move freely: neither a support nor contact with a body that is supported holds it"
-            )
+            raise ValueError("a body can move freely; clamp one of its ends, or let it touch a body that is supported")
         q = factors.solve(right)
-        u: FloatArray = t @ q + start
+        u: FloatArray = t @ q
         return u, float(abs(matrix @ q - right).max() / abs(self.f).max())
 
     def slip_stiffness(self, contacts: _Contacts, slips: BoolArray) -> FloatArray:
@@ -447,10 +415,8 @@ class _Problem:
     def judged(self, contacts: _Contacts, force: FloatArray, relative: FloatArray) -> _Contacts:
         """Return the contacts that follow from the solution."""
         normal, shear, slide = force[:, NORMAL], force[:, TANGENTIAL], relative[:, TANGENTIAL]
-        separation = self.pairs.gap + relative[:, NORMAL]
-        closed = np.where(
-            contacts.closed, normal > -_ROUNDING * abs(normal).max(), separation < -_ROUNDING * abs(relative).max()
-        )
+        overlaps = relative[:, NORMAL] < -_ROUNDING * abs(relative).max()
+        closed = np.where(contacts.closed, normal > -_ROUNDING * abs(normal).max(), overlaps)
         if self.law.friction == 0:
             return _Contacts(closed, contacts.slipping, contacts.direction, contacts.turning)
         limit = self.law.friction * np.maximum(normal, 0)
@@ -496,7 +462,7 @@ class _Problem:
             "slipping": closed & contacts.slipping,
             "force": carried,
             "pressure": normal / self.pairs.area,
-            "separation": self.pairs.gap + relative[:, NORMAL],
+            "separation": relative[:, NORMAL],
             "slide": relative[:, TANGENTIAL],
             "slip_ratio": np.divide(shear, limit, out=np.zeros_like(shear), where=limit > 0),
         }

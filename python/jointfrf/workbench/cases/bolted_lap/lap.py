@@ -12,9 +12,9 @@ from scipy.spatial import cKDTree
 
 from jointfrf.kernel.arguments import FloatArray, as_count, as_positive, check_choice, check_type, one_line
 from jointfrf.models.beam import End, check_ends
+from jointfrf.workbench.cases.bolted_lap.contact import ContactInterface
 from jointfrf.workbench.solids.brick import Material, brick_quality
 from jointfrf.workbench.solids.brick_beam import Preset, holed_plan
-from jointfrf.workbench.solids.contact import ContactInterface
 from jointfrf.workbench.solids.mesh import NEAR, Mesh, Plan, disc, extrude, join_plans, rectangle
 
 __all__ = [
@@ -84,7 +84,7 @@ class Bolt:
     --------
     The default is an M8 bolt:
 
-    >>> from jointfrf.workbench.solids.bolted_lap import Bolt
+    >>> from jointfrf.workbench.cases.bolted_lap.lap import Bolt
     >>> Bolt().shank_radius, Bolt().head_height
     (0.004, 0.0053)
     """
@@ -115,7 +115,7 @@ def preload_force(tensile_area: float, proof_strength: float, share: float = 0.7
     proof_strength : float
         S_p, Pa; see `PROOF_STRENGTH`.
     share : float
-        Of the proof load: 0.75 for connections that are taken apart again, 0.9 for permanent ones.
+        Share of the proof load: 0.75 for connections that are taken apart again, 0.9 for permanent ones.
 
     Returns
     -------
@@ -131,7 +131,7 @@ def preload_force(tensile_area: float, proof_strength: float, share: float = 0.7
     --------
     An M8 bolt of class 10.9:
 
-    >>> from jointfrf.workbench.solids.bolted_lap import PROOF_STRENGTH, STRESS_AREA, preload_force
+    >>> from jointfrf.workbench.cases.bolted_lap.lap import PROOF_STRENGTH, STRESS_AREA, preload_force
     >>> round(preload_force(STRESS_AREA["M8"], PROOF_STRENGTH["10.9"]), 1)
     22783.5
     """
@@ -197,9 +197,10 @@ class BoltedLap:
     interfaces : dict of str to ContactInterface
         "head" (bolt upon A), "lap" (A upon B), "nut" (B upon the bolt): pairs of nodes at the same place.
     clamped : ndarray of int
-        Nodes held in all directions.
+        Nodes that do not move.
     axis : ndarray, shape (3,)
-        Where the axis of the bolt meets the plane between the beams, m. There the shank is cut for the preload.
+        Intersection of the axis of the bolt with the plane between the beams, m. There the shank is cut for the
+        preload.
     preset : {"seed", "accurate"}
     """
 
@@ -241,8 +242,8 @@ def bolted_lap(
 ) -> BoltedLap:
     """Lap joint with a bolt of solid elements, case study 2 by default.
 
-    A lies at z from 0, y from 0 up; B at z from the length of A less the overlap, y from 0 down; the axis of the bolt
-    is along y through the middle of the overlap.
+    A lies at z from 0, y from 0 up. B lies at z from the length of A less the overlap, y from 0 down. The axis of the
+    bolt is along y through the middle of the overlap.
 
     Parameters
     ----------
@@ -267,14 +268,14 @@ def bolted_lap(
     Raises
     ------
     ValueError
-        A dimension that is not positive; a hole that is not wider than the shank; a head or nut that does not cover the
-        hole or reaches beyond the overlap; bricks that are badly shaped.
+        A dimension is not positive, the hole is not wider than the shank, the head or nut does not cover the hole or
+        reaches beyond the overlap, or bricks are badly shaped.
     TypeError
         Not a pair where one is asked for; a bolt, material or divisions of another kind.
 
     Examples
     --------
-    >>> from jointfrf.workbench.solids.bolted_lap import bolted_lap
+    >>> from jointfrf.workbench.cases.bolted_lap.lap import bolted_lap
     >>> lap = bolted_lap()
     >>> len(lap.mesh.elements), {name: len(pairs.area) for name, pairs in lap.interfaces.items()}
     (3840, {'head': 96, 'lap': 288, 'nut': 96})

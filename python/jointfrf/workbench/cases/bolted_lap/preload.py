@@ -4,21 +4,46 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from jointfrf.dofs import DIRECTIONS
-from jointfrf.kernel.arguments import FloatArray, as_positive, check_type
-from jointfrf.workbench.solids.bolted_lap import INTERFACES, BoltedLap
+from jointfrf.kernel.arguments import FloatArray, as_count, as_positive, check_type
+from jointfrf.workbench.cases.bolted_lap.contact import ContactLaw, InterfaceState, Iteration, Pairs, solve_contact, tie
+from jointfrf.workbench.cases.bolted_lap.lap import INTERFACES, BoltedLap
 from jointfrf.workbench.solids.brick import Formulation, assemble_bricks
 from jointfrf.workbench.solids.brick_beam import PRESETS
-from jointfrf.workbench.solids.contact import ContactLaw, InterfaceState, Iteration, Pairs, solve_contact, tie
 from jointfrf.workbench.solids.mesh import NEAR
 from jointfrf.workbench.solids.solid import SolidModel, solid_model
 
 __all__ = ["PreloadedLap", "preload"]
+
+
+class PressureMap(NamedTuple):
+    """Pressure on the two faces of an interface, which is the same on both.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 2)
+        z and x before loading, m.
+    quads : ndarray of int, shape (n_quads, 4)
+        Corners, counted in `points`.
+    pressure : ndarray, shape (n,)
+        Pa; 0 at open pairs.
+    closed, slipping : ndarray of bool, shape (n,)
+    nodes : ndarray of int, shape (n,)
+        Nodes of the mesh, on the upper body, counted from 0.
+    """
+
+    points: FloatArray
+    quads: NDArray[np.int32]
+    pressure: FloatArray
+    closed: NDArray[np.bool_]
+    slipping: NDArray[np.bool_]
+    nodes: NDArray[np.int32]
 
 
 @dataclass(frozen=True)
@@ -32,14 +57,14 @@ class PreloadedLap:
         Preload, N.
     law : ContactLaw
     elongation : float
-        By how much the two halves of the shank were drawn over each other at the cut, m: the stretch of the bolt and
-        the compression of what it clamps.
+        Length over which the two halves of the shank were drawn over each other at the cut, m: the stretch of the bolt
+        and the compression of the clamped parts.
     displacement : ndarray, shape (n_nodes, 3)
-        m. On the plane of the cut, that of the upper half of the shank.
+        m. On the plane of the cut: of the upper half of the shank.
     interfaces : dict of str to InterfaceState
         "head", "lap" and "nut", in the order of the pairs of `lap.interfaces`.
     history : tuple of Iteration
-        Of the contact; the last one agrees with its own contacts.
+        Iterations of the contact; the last one agrees with its own contacts.
     """
 
     lap: BoltedLap
@@ -57,8 +82,20 @@ class PreloadedLap:
         return float(np.linalg.norm((self.lap.mesh.nodes[nodes] - self.lap.axis)[:, [0, 2]], axis=1).max())
 
     def pressure_maps(self) -> dict[str, PressureMap]:
-        """Return the contact pressure on "head", "lap" and "nut" in plan view (figures 4-13 to 4-15)."""
-        return pressure_maps(self.lap, self.interfaces)
+        """Return the contact pressure on "head" (upper face of A), "lap" and "nut" (lower face of B) in plan view."""
+        nodes, (faces, _) = self.lap.mesh.nodes, self.lap.mesh.faces()
+        height = nodes[:, 1]
+        flat = faces[np.ptp(height[faces], axis=1) < NEAR * np.ptp(height)]
+        maps = {}
+        for name in INTERFACES:
+            upper, state = self.lap.interfaces[name].upper, self.interfaces[name]
+            number = np.full(len(nodes), -1)
+            number[upper] = np.arange(len(upper))
+            quads = number[flat]
+            quads = quads[(quads >= 0).all(axis=1)].astype(np.int32)
+            points = nodes[upper][:, [2, 0]]
+            maps[name] = PressureMap(points, quads, state.pressure, state.closed, state.slipping, upper)
+        return maps
 
     def model(self) -> SolidModel:
         """Linear model for small vibrations about this state, the shank locked at its length.
@@ -70,10 +107,10 @@ class PreloadedLap:
 
         Notes
         -----
-        Closed pairs are held along y, and those of them that stick along x and z: by the springs of the law, or where
-        it is rigid by eliminating the upper node. Closed pairs that slip are free along x and z. Open pairs are free.
-        A loss factor that all materials share is that of the whole stiffness, the springs between faces included;
-        otherwise these springs have none.
+        The springs of the law connect closed pairs along y, and sticking pairs also along x and z; a rigid law
+        eliminates the upper node instead. Slipping pairs are free along x and z, open pairs in all directions. A loss
+        factor that all materials share applies to the whole stiffness, including the springs between faces; otherwise
+        these springs have none.
         """
         formulation = PRESETS[self.lap.preset]
         bodies = solid_model(
@@ -108,7 +145,7 @@ def preload(lap: BoltedLap, force: float, law: ContactLaw | None = None, *, max_
     force : float
         Preload, N; see `preload_force`.
     law : ContactLaw, optional
-        Of all three interfaces; ``ContactLaw()`` by default.
+        Law of all three interfaces; ``ContactLaw()`` by default.
     max_iterations : int
 
     Returns
@@ -142,8 +179,8 @@ def preload(lap: BoltedLap, force: float, law: ContactLaw | None = None, *, max_
 
     Examples
     --------
-    >>> from jointfrf.workbench.solids.bolted_lap import LapDivisions, bolted_lap
-    >>> from jointfrf.workbench.solids.preload import preload
+    >>> from jointfrf.workbench.cases.bolted_lap.lap import LapDivisions, bolted_lap
+    >>> from jointfrf.workbench.cases.bolted_lap.preload import preload
     >>> coarse = LapDivisions(across=4, rings=1, circles=0, head=1, nut=1)
     >>> tight = preload(bolted_lap((0.1, 0.1), divisions=coarse), 20e3)
     >>> {name: round(state.normal_force, 6) for name, state in tight.interfaces.items()}
@@ -153,6 +190,7 @@ def preload(lap: BoltedLap, force: float, law: ContactLaw | None = None, *, max_
     used = ContactLaw() if law is None else law
     check_type("law", used, ContactLaw)
     as_positive("force", force, "N")
+    iterations = as_count("max_iterations", max_iterations)
     if lap.clamped.size == 0:
         raise ValueError("lap is not supported: one of its ends must be clamped")
     formulation = PRESETS[lap.preset]
@@ -161,7 +199,7 @@ def preload(lap: BoltedLap, force: float, law: ContactLaw | None = None, *, max_
     column = sparse.csr_array(coupling[:, None])
     cut = sparse.csr_array(sparse.block_array([[k, column], [column.T, sparse.csr_array([[own]])]], format="csr"))
     load = np.append(np.zeros(len(coupling)), force)
-    solution = solve_contact(cut, load, lap.interfaces, used, fixed=lap.held(), max_iterations=max_iterations)
+    solution = solve_contact(cut, load, lap.interfaces, used, fixed=lap.held(), max_iterations=iterations)
     return PreloadedLap(
         lap=lap,
         force=force,
@@ -184,63 +222,3 @@ def _cut(lap: BoltedLap, formulation: Formulation) -> tuple[FloatArray, float]:
     k, _ = assemble_bricks(nodes, below, lap.materials[2], formulation)
     coupling: FloatArray = k @ drawn
     return coupling, float(drawn @ coupling)
-
-
-@dataclass(frozen=True)
-class PressureMap:
-    """Pressure on the two faces of an interface, which is the same on both.
-
-    Attributes
-    ----------
-    points : ndarray, shape (n, 2)
-        z and x before loading, m.
-    quads : ndarray of int, shape (n_quads, 4)
-        Corners, counted in `points`.
-    pressure : ndarray, shape (n,)
-        Pa; 0 where nothing touches.
-    closed, slipping : ndarray of bool, shape (n,)
-    nodes : ndarray of int, shape (n,)
-        Of the mesh, on the upper body, counted from 0.
-    """
-
-    points: FloatArray
-    quads: NDArray[np.int32]
-    pressure: FloatArray
-    closed: NDArray[np.bool_]
-    slipping: NDArray[np.bool_]
-    nodes: NDArray[np.int32]
-
-
-def pressure_maps(lap: BoltedLap, states: Mapping[str, InterfaceState]) -> dict[str, PressureMap]:
-    """Return the contact pressure on all interfaces.
-
-    Parameters
-    ----------
-    lap : BoltedLap
-    states : mapping of str to InterfaceState
-
-    Returns
-    -------
-    dict of str to PressureMap
-        "head": upper face of A and the head; "lap": lower face of A and upper face of B; "nut": lower face of B and the
-        nut.
-    """
-    return {name: _map(lap, name, states[name]) for name in INTERFACES}
-
-
-def _map(lap: BoltedLap, name: str, state: InterfaceState) -> PressureMap:
-    nodes = lap.interfaces[name].upper
-    height = lap.mesh.nodes[:, 1]
-    number = np.full(len(height), -1)
-    number[nodes] = np.arange(len(nodes))
-    faces, _ = lap.mesh.faces()
-    flat = np.ptp(height[faces], axis=1) < NEAR * np.ptp(height)
-    quads = number[faces[flat]]
-    return PressureMap(
-        points=lap.mesh.nodes[nodes][:, [2, 0]],
-        quads=quads[(quads >= 0).all(axis=1)].astype(np.int32),
-        pressure=state.pressure,
-        closed=state.closed,
-        slipping=state.slipping,
-        nodes=nodes,
-    )
