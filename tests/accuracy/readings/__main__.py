@@ -18,13 +18,13 @@ from .study import ReadingsPlan, group_cases, study_readings
 
 
 def numbers(words: str) -> tuple[float, ...]:
-    """Return whole numbers separated by commas."""
+    """Return positive numbers separated by commas."""
     try:
         found = tuple(float(word) for word in words.split(","))
     except ValueError:
         found = ()
     if not all(0 < one < math.inf for one in found or [0.0]):
-        raise argparse.ArgumentTypeError(f"must be whole numbers, separated by commas, not {words!r}")
+        raise argparse.ArgumentTypeError(f"must be positive numbers, separated by commas, not {words!r}")
     return found
 
 

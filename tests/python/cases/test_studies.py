@@ -306,9 +306,9 @@ def test_command_says_what_the_study_holds(reference, tmp_path):
         (
             ["3.1", "--executor", "dusk"],
             2,
-            "unknown executor 'dusk'; use one of processes, threads, loky, mpi",
+            "unknown value 'dusk'; use one of processes, threads, loky, mpi",
         ),
-        (["3.1", "--values", "csv"], 2, "unknown format 'csv'; use parquet or npz"),
+        (["3.1", "--values", "csv"], 2, "unknown value 'csv'; use one of parquet, npz"),
     ],
 )
 def test_wrong_words_are_one_sentence(words, status, message, tmp_path, monkeypatch):

@@ -72,7 +72,7 @@ class _Hypothesis(NamedTuple):
 
 
 def _exchanges(
-    h: Polar, size: FloatArray, smooth: FloatArray, n_freq: int, pairs: NDArray[np.intp]
+    h: Polar, size: FloatArray, smooth: FloatArray, n_freq: int | None, pairs: NDArray[np.intp]
 ) -> Iterator[_Hypothesis]:
     """Yield exchanges of two responses, for reciprocity the same as exchanges of two forces."""
     for pair in pairs:
@@ -91,9 +91,9 @@ def _copies(h: Polar, size: FloatArray, pairs: NDArray[np.intp]) -> Iterator[_Hy
         yield _Hypothesis("force", (first, copy), across.at([copy]), across.at([first]), size.T[[copy]] > 0)
 
 
-def _judged(size: FloatArray, smooth: FloatArray, n_freq: int) -> NDArray[np.bool_]:
-    """Return the pairs, shape (n, n), whose reciprocity the FRFs can show."""
-    found = are_signals(size, smooth, n_freq) | are_one_sided(size, smooth)
+def _judged(size: FloatArray, smooth: FloatArray, n_freq: int | None) -> NDArray[np.bool_]:
+    """Return the pairs, shape (n, n), whose reciprocity the FRFs can show; without `n_freq`, all pairs with FRFs."""
+    found = size > 0 if n_freq is None else are_signals(size, smooth, n_freq) | are_one_sided(size, smooth)
     np.fill_diagonal(found, False)
     return found
 
@@ -115,24 +115,27 @@ def find_cause(m: Measurement, pairs: PairRatios) -> Cause | None:
     hypothesis has no parameter, so the scores compare as BIC does.
 
     Both sides of a stiff joint move alike. An exchange of these two changes reciprocity by some percent, and equal
-    responses there are no evidence of a copy, unless pairs are broken.
+    responses there are no evidence of a copy, unless pairs are broken. If no pair is broken, FRFs that consist of noise
+    count as well: a lower misfit of a single pair is no evidence.
     """
     some = m.square[:: -(-len(m.freq_hz) // _MOST_LINES)]
     polar, n = Polar.of(some), m.rows.size
     size, smooth = np.asarray(np.median(abs(m.square), axis=0), float), m.square_smoothness
     signals = _judged(size, smooth, len(m.freq_hz))
-    named = np.where(signals, _misfit(polar, polar.transposed)[1], 0.0)
-    mean = named.sum(axis=1) / np.maximum(signals.sum(axis=1), 1)
-    logs = np.where(signals, np.log(named + _ROUND_OFF), 0.0)
+    misfits = _misfit(polar, polar.transposed)[1]
+    mean = np.where(signals, misfits, 0.0).sum(axis=1) / np.maximum(signals.sum(axis=1), 1)
     broken = np.zeros((n, n), bool)
     broken[pairs.p, pairs.q] = broken[pairs.q, pairs.p] = pairs.broken
     n_broken = int(pairs.broken.sum())
+    n_freq = len(m.freq_hz) if n_broken else None
+    judged = _judged(size, smooth, n_freq)
+    logs = np.where(judged, np.log(misfits + _ROUND_OFF), 0.0)
     directions = np.array([name.rpartition(":")[2] for name in m.dofs])
     alike, off = directions[:, None] == directions, mean >= BROKEN
     swaps = np.argwhere(np.triu(alike | (off[:, None] & off) | (n_broken > 0), 1))
     copies = np.argwhere(off & (~alike | (n_broken > 0)) & ~np.eye(n, dtype=bool))
     found: list[tuple[int, float, Cause]] = []
-    for one in (*_exchanges(polar, size, smooth, len(m.freq_hz), swaps), *_copies(polar, size, copies)):
+    for one in (*_exchanges(polar, size, smooth, n_freq, swaps), *_copies(polar, size, copies)):
         at = list(one.channels if one.kind == "exchanged" else one.channels[1:])
         scatter, misfit = (values[one.judged] for values in _misfit(one.shown, one.expected))
         # A copy agrees in all FRFs; both sides of a stiff joint agree in most.
@@ -140,7 +143,7 @@ def find_cause(m: Measurement, pairs: PairRatios) -> Cause | None:
         after = float(np.exp(own.mean() if one.kind == "exchanged" else own.max())) if own.size else np.inf
         if one.kind != "exchanged" and after > BROKEN / 2:
             continue
-        before = float(np.exp(logs[at].sum() / max(signals[at].sum(), 1)))
+        before = float(np.exp(logs[at].sum() / max(judged[at].sum(), 1)))
         others, left = int(np.delete(np.delete(broken, at, 0), at, 1).sum() // 2), int((scatter >= BROKEN).sum())
         if before < _LESS * after or left > _LEFT * (n_broken - others):
             continue
