@@ -361,7 +361,7 @@ def _blind_spots(fit: Fit) -> Section:
         "(position_error): an error of 1 mm between two points changes the rotation between them by 1 mm over their "
         f"distance.{changes('position', '1 mm at each point')}",
     ]
-    return Section("blind", "What this test cannot know", [Words([seen, *others])])
+    return Section("blind", "Errors that this test cannot show", [Words([seen, *others])])
 
 
 def _cards(fit: Fit, nodes: Sequence[int]) -> list[Part]:
