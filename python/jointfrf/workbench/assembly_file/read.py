@@ -385,7 +385,7 @@ def scaled_model(model: Model, *, length_scale: float, **factors: float) -> Mode
         found = of_dof @ sp.csr_array(matrix) @ of_dof * factor
         return found if sp.issparse(matrix) else found.toarray()
 
-    if isinstance(model, PointModel):  # motions that are shown, of the DOFs and per length where they are rotations
+    if isinstance(model, PointModel):  # shown motions follow the DOFs; rotations are per length
         of_turn = {name: 1 / length_scale if is_rotation(name.rpartition(":")[2]) else 1.0 for name in model.shown}
         model = replace(
             model,

@@ -40,7 +40,7 @@ _RIGID_HZ = 1e-2
 _WHOLE, _REAL, _WORDS = 10, 13, {2: 1, 4: 1, 5: 2, 6: 2}
 #: Normal modes, complex modes by displacement.
 _NORMAL, _COMPLEX = 2, 3
-#: The driving point of a mode must not move less than this share of where it moves most.
+#: Least motion of the driving point of a mode, as a share of its largest motion.
 _SEEN = 1e-6
 
 

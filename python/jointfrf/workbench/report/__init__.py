@@ -8,7 +8,7 @@ draw         a figure drawn by matplotlib to a PNG and an SVG file
 chart        a figure as part of a page, which a script zooms
 sketch       the channels around a joint; the parts of an assembly with sensors and impacts
 document     one self-contained HTML page from sentences, tables, figures and texts
-fit          figures of an identification and of where its information lies; its files
+fit          figures of an identification and of its information over frequency; its files
 fit_frfs     measured FRFs against those regenerated or predicted; maps of agreement and residual
 fit_words    results of a fit and recommended measurements, in sentences and tables
 fit_page     the page on an identification

@@ -192,7 +192,7 @@ def thinned_line(y: FloatArray, most: int) -> NDArray[np.intp]:
     Parameters
     ----------
     y : ndarray, shape (n,)
-        Values in the order of x; NaN makes a gap, which stays where it is a column wide.
+        Values in the order of x; NaN makes a gap, which is kept if it is at least a column wide.
     most : int
         Largest number of points.
 

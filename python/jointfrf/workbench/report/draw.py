@@ -292,7 +292,7 @@ def _draw_surface(ax: Any, surface: Surface) -> None:
 
 
 def _draw_axes_of_space(axes: list[Any]) -> None:
-    """Give drawings in space one scale, and arrows along the axes in the corner that one along z leaves free."""
+    """Set one scale for drawings in space, and draw arrows along the axes in a free corner."""
     for ax in axes:
         ax.set_xlim(min(one.get_xlim()[0] for one in axes), max(one.get_xlim()[1] for one in axes))
         ax.set_ylim(min(one.get_ylim()[0] for one in axes), max(one.get_ylim()[1] for one in axes))
