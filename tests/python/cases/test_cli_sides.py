@@ -58,7 +58,7 @@ def test_the_nearest_node_of_a_coarse_part_is_said(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"elements": "3", "joint": '["4:y", "4:theta"]'}, "no node is at channel 101:+y, (-20, 0, 0) mm"),
+        ({"elements": "3", "joint": '["4:y", "4:theta"]'}, "channel 101:+y at (-20, 0, 0) mm from the joint is"),
         ({"joint": '["31:y"]'}, "1 DOFs; name the 2 DOFs of the joint"),
         ({"joint": '["31:y", "99:theta"]'}, "99:theta"),
         ({"unknown": "{ weight = 0.1 }"}, "weight"),

@@ -150,7 +150,7 @@ def test_more_realisations_are_added_to_what_is_there(reference, tmp_path):
 
 
 def test_another_study_does_not_go_into_the_same_folder(reference):
-    with pytest.raises(jf.FileContentError, match=r"holds another study, of 3\.1-discrete, whose factors differ"):
+    with pytest.raises(jf.FileContentError, match=r"contains another study, of 3\.1-discrete, whose factors differ"):
         jf.study(CASE, reference.folder, N, design=replace(DESIGN, factors={"lines": [50]}))
     with pytest.raises(jf.FileContentError, match="whose case differ"):
         jf.study("3.2", reference.folder, N)
@@ -296,7 +296,7 @@ def test_command_says_what_the_study_holds(reference, tmp_path):
         (["3.1", "3.2"], 2, "several cases are given, 3.1 and 3.2"),
         (["3.11"], 2, "unknown case '3.11'; name a folder"),
         (["merge", "somewhere"], 2, "folders of parts or --out are missing"),
-        (["merge", "somewhere", "--out", "there"], 1, "somewhere holds no study"),
+        (["merge", "somewhere", "--out", "there"], 1, "somewhere contains no study.json"),
         (
             ["3.1", "--estimator", "compliances"],
             1,

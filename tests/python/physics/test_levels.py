@@ -501,7 +501,7 @@ def test_the_command_needs_no_models_of_frfs_at_the_joint(capsys, tmp_path):
     across = abs((h[:, 0] - h[:, 1]) / h[:, 1]) * 1e-4
     assert across.min() < one["lowest"] <= one["amplitude"] <= one["highest"] < across.max()
     assert main(["levels", files[0], "--level", "1e-4", "--held", "3:+x", *joint]) == 2
-    assert "test_1.npz has no such channel; use one of 1:+x, 2:+x" in capsys.readouterr().err
+    assert "test_1.npz has no channel 3:+x to control; use one of 1:+x, 2:+x" in capsys.readouterr().err
 
 
 def test_levels_of_one_assembly_share_the_errors_of_its_models(beam):

@@ -17,8 +17,8 @@ HEAD = """# Keys of assembly.toml, joint.toml and tables of channels
 
 <!-- python tests/python/support/assembly_keys.py docs/assembly-keys.md -->
 
-[Fits with models](model-fit.md) say what it is for. SI units. Files that a key names stand relative to the folder.
-A key that is not in this list is an error that lists those that are.
+[Fits with models](model-fit.md) use these files. SI units. Files that a key names are relative to the folder. A key
+that is not in this list causes an error that lists the valid keys.
 
 """
 

@@ -366,7 +366,7 @@ def test_windows_that_cannot_be_taken_off(h):
 
 def said_of_blind_spots(fit):
     (section,) = (one for one in fit_document(fit, ReportOptions()).sections if one.key == "blind")
-    assert section.heading == "What this test cannot know"
+    assert section.heading == "Errors that this test cannot show"
     return section.parts[0].sentences
 
 

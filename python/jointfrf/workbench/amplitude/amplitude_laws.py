@@ -18,25 +18,25 @@ __all__ = ["AMPLITUDE_LAWS", "AmplitudeLawFit", "AmplitudeLawFits", "fit_amplitu
 
 #: Slip displacements that fits start from, times the median amplitude: a decade to either side.
 _STARTS = (0.1, 0.3, 1.0, 3.0, 10.0)
-#: Iwan exponents stay away from -1, where the element has no stiffness.
+#: Least distance of an Iwan exponent from -1, at which the element has no stiffness.
 _CHI = (-0.98, 1.0)
-#: Logarithms of parameters stay within these of the start: a parameter farther away has no effect that data show.
+#: Largest distance of a parameter's logarithm from its initial value; beyond it the data do not change.
 _FAR = 14.0
-#: A stiffness below this part of the measured one is rounding of the terms it is the difference of.
+#: Share of the measured stiffness below which a difference of terms is rounding.
 _ROUNDING = 1e-12
-#: Residuals rarer than this by chance are those of a law that is not the joint's, or of errors that are too small.
+#: p-value of the residuals below which the law is wrong or the errors are too small.
 _CHANCE = 1e-3
-#: Logarithmic distance from the best at least, and evaluations, at which a profile is taken.
+#: Least logarithmic distance from the minimum, and number of evaluations, of a profile.
 _BEND, _PROFILE = 0.1, 100
-#: Share of each variance that is independent at least, so that the covariance has an inverse.
+#: Least share of each variance that is independent, so that the covariance has an inverse.
 _OWN = 1e-6
-#: Values and errors lie within these, so that no square of a ratio overflows.
+#: Range of values and errors in which no square of a ratio overflows.
 _LEAST, _MOST = 1e-30, 1e30
 
 
 @dataclass(frozen=True)
 class _Law:
-    """Names of parameters, those fitted by their logarithm, starts by (k at the lowest level, slip), and K(a)."""
+    """Names of parameters, names fitted by logarithm, initial values by (k at the lowest level, slip), and K(a)."""
 
     names: tuple[str, ...]
     start: Callable[[float, float], tuple[float, ...]]
@@ -81,20 +81,21 @@ class AmplitudeLawFit:
     Attributes
     ----------
     law : str
+        Name of the law.
     values : dict of str to float
         Parameters; forces in N, stiffness in N/m, displacements in m.
     intervals : dict of str to (float, float)
-        Of the parameters; symmetric in the logarithm of stiffness, force and displacement. 0 .. inf where the data
-        do not determine a parameter.
+        Intervals of the parameters, symmetric in the logarithm of stiffness, force and displacement; 0 .. inf if the
+        data do not determine a parameter.
     chi_square, degrees : float, int
         Squared residuals in the metric of the covariance of the levels, and their degrees of freedom.
     widened : float
-        By how much intervals are wider than the standard errors alone make them: the root of chi_square / degrees
-        where chance has less than one in a thousand such residuals, else 1.
+        Factor by which residuals widen the intervals: the root of chi_square / degrees if the p-value of the residuals
+        is below 0.001, else 1.
     aicc, bic : float
-        Akaike's criterion, corrected for few data, and the Bayesian one; the lowest is the best.
+        Akaike's criterion, corrected for few data, and the Bayesian criterion; lower is better.
     stiffness, loss_factor : ndarray, shape (n_levels,)
-        Of the law at the amplitudes.
+        Values of the law at the amplitudes, N/m and 1.
     """
 
     law: str
@@ -111,20 +112,21 @@ class AmplitudeLawFit:
 
 @dataclass(frozen=True)
 class AmplitudeLawFits:
-    """Laws fitted to a joint at several levels, the best by AICc first; `print` shows them.
+    """Laws fitted to a joint at several levels, the lowest AICc first; `print` shows them.
 
     Attributes
     ----------
     fits : tuple of AmplitudeLawFit
+        One fit for each law.
     left_out : dict of str to str
-        Laws with too many parameters for the levels, and why.
+        Reason for each law that was not fitted.
     """
 
     fits: tuple[AmplitudeLawFit, ...]
     left_out: dict[str, str]
 
     def __str__(self) -> str:
-        """Return a table of the laws, and one of the parameters of the best."""
+        """Return a table of the laws, and a table of the parameters of the best law."""
         best = self.fits[0]
         laws = [("law", "AICc", "BIC", "chi^2", "degrees of freedom")]
         laws += [(f.law, _shown(f.aicc), _shown(f.bic), f"{f.chi_square:.3g}", str(f.degrees)) for f in self.fits]
@@ -135,7 +137,7 @@ class AmplitudeLawFits:
 
 
 def _shown(criterion: float) -> str:
-    """Return a criterion with one decimal; of large ones, four digits are more than the data state."""
+    """Return a criterion with one decimal, or with four digits if it is large."""
     return f"{criterion:.1f}" if abs(criterion) < 1000 else f"{criterion:.4g}"
 
 
@@ -150,39 +152,46 @@ def fit_amplitude_laws(
     laws: Iterable[str] = AMPLITUDE_LAWS,
     probability: float = 0.95,
 ) -> AmplitudeLawFits:
-    """Fit laws over amplitude to k(a) and eta(a) of one joint, and order them by AICc.
+    """Fit laws over amplitude to k(a) and eta(a) of one joint, and return them by rising AICc.
 
     Parameters
     ----------
     amplitude : array_like, shape (n_levels,)
-        Of the relative motion in the joint, m, as a peak value.
+        Peak value of the relative motion in the joint, m.
     stiffness, loss_factor : array_like, shape (n_levels,)
-        Of the joint at each level, N/m and 1.
+        Stiffness and loss factor of the joint at each level, N/m and 1.
     stiffness_error, loss_factor_error : array_like, shape (n_levels,)
-        Standard errors.
+        Standard errors of stiffness and loss factor, N/m and 1.
     common : array_like, shape (n_errors, 2, n_levels), optional
         Changes of stiffness and loss factor by one standard deviation of each error that all levels share, such as the
         error of a modulus. By default errors are independent between levels.
     laws : iterable of {"constant", "power", "jenkins", "iwan", "bouc-wen"}
-        "power" has a constant stiffness, and a loss factor that goes with a power of the amplitude ("loss_factor" is
-        that at the median amplitude); "iwan" is Segalman's element; "jenkins" and "bouc-wen" (n = 1, beta = gamma)
-        have a parallel spring. The last three have a constant loss factor of the stiffness at rest besides.
+        Names of the laws, default all. "power" has a constant stiffness, and a loss factor that is a power of the
+        amplitude ("loss_factor" is its value at the median amplitude). "iwan" is Segalman's element. "jenkins" and
+        "bouc-wen" (n = 1, beta = gamma) have a parallel spring. These three also have a constant loss factor of the
+        stiffness at rest.
     probability : float
-        Of the intervals.
+        Coverage probability of the intervals, default 0.95.
 
     Returns
     -------
     AmplitudeLawFits
+        One fit for each law, the lowest AICc first.
 
     Raises
     ------
     ValueError
         Values that are not positive, or beyond 1e-30 to 1e30, unknown laws, levels too few for any of the laws.
 
+    See Also
+    --------
+    levels : stiffness and loss factor from fits at several levels.
+    decay_levels : stiffness and loss factor from free decays.
+
     Notes
     -----
     The residuals of ln k and of eta are whitened by their covariance; intervals come from their derivatives.
-    Stiffness and loss factor are those of the first harmonic, which FRFs of stepped sines show.
+    Stiffness and loss factor belong to the first harmonic, which FRFs of stepped sines show.
 
     Examples
     --------
@@ -233,7 +242,7 @@ def _positive(name: str, value: ArrayLike, size: int | None) -> FloatArray:
 def _whitening(errors: FloatArray, common: FloatArray) -> FloatArray:
     """Return the inverse root of the covariance of ln k and eta, shape (2 n, 2 n), by errors (2, n) and common parts.
 
-    What errors have beyond the common parts is independent; at least a share of rounding is.
+    The remainder of the errors beyond the common parts is independent, and at least rounding.
     """
     columns, variance = common.reshape(len(common), errors.size), np.square(errors).ravel()
     own = np.maximum(variance - np.square(columns).sum(axis=0), _OWN * variance)
@@ -285,7 +294,7 @@ def _fit(law: str, a: FloatArray, k: FloatArray, eta: FloatArray, white: FloatAr
             best, bounds = run, np.array([low, high])
     assert best is not None
     _, values, rows = np.linalg.svd(best.jac, full_matrices=False)
-    # A direction that changes no residual by more than rounding has an error beyond all bounds, not none.
+    # A direction in which residuals change by less than rounding has an unbounded error, not a zero one.
     values = np.maximum(values, np.finfo(float).eps * values[0])
     n, count, chi_square = 2 * a.size, len(own.names), 2 * float(best.cost)
     widened = math.sqrt(chi_square / (n - count)) if chdtrc(n - count, chi_square) < _CHANCE else 1.0
@@ -297,7 +306,7 @@ def _fit(law: str, a: FloatArray, k: FloatArray, eta: FloatArray, white: FloatAr
         ends = (float(x - half), float(x + half))
         if logarithmic:  # beyond a factor of exp(7) to either side the data do not determine it
             ends = (math.exp(ends[0]), math.exp(ends[1])) if half < _FAR / 2 else (0.0, math.inf)
-            if half < _FAR / 2:  # nor do they where the residual hardly grows: the law may have a bend at its best
+            if half < _FAR / 2:  # a flat profile is checked too: the law may have a kink at the minimum
                 i, most = own.names.index(name), chi_square + (widened * float(ndtri((1 + share) / 2))) ** 2
                 far = [
                     _profile(residual, best.x, bounds, i, x + side * max(2 * half, _BEND)) < most for side in (-1, 1)

@@ -1,4 +1,4 @@
-"""Modal backbones, frequency and damping over amplitude, turned into stiffness and loss factor of a joint by models."""
+"""Stiffness and loss factor of a joint from modal backbones (frequency and damping over amplitude), by models."""
 
 from __future__ import annotations
 
@@ -29,34 +29,34 @@ from jointfrf.workbench.amplitude.levels import JointLevel, JointLevels, check_l
 
 __all__ = ["Backbone", "backbone_levels"]
 
-#: Step of differences, in standard errors: their error is of the second order.
+#: Step of central differences, in standard errors.
 _STEP = 1e-3
-#: Points of omega^2 about that of the mode, in units of the damping ratio, through which a polynomial goes to the
-#: complex one: it lies as far away as the outermost of them. Below the least spacing rounding would show; above the
-#: largest one frequencies would not be positive.
+#: Points of omega^2 about omega^2 of the mode, in units of the damping ratio, through which a polynomial continues the
+#: receptance to the complex frequency, which is as far away as the outermost point. Below the least spacing rounding
+#: matters; above the largest spacing frequencies are not positive.
 _POINTS, _LEAST, _MOST = np.arange(-2, 3), 1e-4, 0.4
 
 
 @dataclass(frozen=True)
 class Backbone:
-    """A mode of an assembly at several amplitudes; one of `damping` and `force` is given.
+    """Frequency and damping of a mode at several amplitudes; give either `damping` or `force`.
 
     Parameters
     ----------
     channel : str
-        DOF whose amplitude is given, ``"A/1:y"``; empty for the relative motion in the joint itself (with `damping`).
+        DOF of the amplitude, ``"A/1:y"``; empty for the relative motion in the joint itself (with `damping`).
     freq_hz : array_like, shape (n,)
-        Frequency of the mode, Hz: of a free decay that of the undamped mode, |s| / (2 pi).
+        Frequency of the mode, Hz; in a free decay the frequency of the undamped mode, |s| / (2 pi).
     amplitude : array_like, shape (n,)
         Peak displacement of the channel, m or rad.
     damping : array_like, shape (n,), optional
         Damping ratio.
     force : array_like, shape (n,), optional
-        Of tests at phase resonance: the force that acts at the channel, which lags it by 90 degrees, peak, N or N m.
+        Peak force at the channel in tests at phase resonance, where the motion lags the force by 90 degrees, N or N m.
     freq_error, damping_error : float or array_like, shape (n,)
         Relative standard errors of the frequency, and of damping or of amplitude over force.
     labels : sequence of str, optional
-        By default the numbers of the points.
+        Names of the points, default their numbers.
     shared_error : tuple of float
         Relative standard errors of frequency and of damping (or force) that all points share, default none.
 
@@ -115,23 +115,25 @@ def backbone_levels(
     laws: Iterable[str] = AMPLITUDE_LAWS,
     probability: float = 0.95,
 ) -> JointLevels:
-    """Turn the backbone of a mode into k(a) and eta(a) of a joint DOF, by models of the assembly.
+    """Return k(a) and eta(a) of a joint DOF from the backbone of a mode, by models of the assembly.
 
     Parameters
     ----------
     whole : Assembly
-        All as believed, but for the DOF that is found.
+        Models of both parts, and the joint except the DOF to be identified.
     backbone : Backbone
+        Frequency and damping of the mode over amplitude.
     dof : str, optional
-        DOF of the joint; needed where more than one has a law.
+        DOF of the joint; needed if more than one has a law.
     laws : iterable of str
-        As in `fit_amplitude_laws`; none where it is empty.
+        Names of the laws to fit (see `fit_amplitude_laws`), default all; empty for no fit.
     probability : float
-        Of the intervals.
+        Coverage probability of the intervals, default 0.95.
 
     Returns
     -------
     JointLevels
+        Stiffness and loss factor at each point of the backbone, and the laws.
 
     Raises
     ------
@@ -140,16 +142,21 @@ def backbone_levels(
     SingularLineError
         A part that is undamped resonates at the frequency.
 
+    See Also
+    --------
+    decay_levels : stiffness and loss factor from free decays.
+    levels : stiffness and loss factor from fits at several levels.
+
     Notes
     -----
-    With y the receptance across the DOF where the joint is open, the mode has 1 + K* y = 0 at the complex frequency
-    w^2 (1 + 2 i zeta), so K* = -1 / y there; y is continued by the polynomial through five real frequencies. At phase
-    resonance H of the driven channel is -i |H|, and H = H_open - c K* c / (1 + K* y), with c from the channel to the
-    joint, is solved for K* at the frequency itself.
+    Let y be the receptance across the DOF of the open joint. The mode has 1 + K* y = 0 at the complex frequency
+    w^2 (1 + 2 i zeta), so K* = -1 / y there. A polynomial through five real frequencies continues y to it. At phase
+    resonance H of the driven channel is -i |H|. With c from the channel to the joint, the equation
+    H = H_open - c K* c / (1 + K* y) is solved for K* at the frequency itself.
 
-    Intervals are those of first order, from errors of frequency and damping, and from the standard deviations of what
-    is unknown of the models, which all levels share. The shape of the mode changes with K*; mean and scatter of the
-    lines do not enter: a point of the backbone has one amplitude.
+    Intervals are of first order. They contain errors of frequency and damping, and the standard deviations of unknowns
+    of the models, which all levels share. The shape of the mode changes with K*. A point of the backbone has one
+    amplitude, so mean and scatter of lines do not enter.
 
     Examples
     --------
@@ -168,7 +175,7 @@ def backbone_levels(
         if isinstance(part.source, FrfSource):
             raise ValueError(f"{name} is given by FRFs; give models of both parts for a backbone")
     whole.check([backbone.channel] if backbone.channel else [], "channel")
-    with np.errstate(all="ignore"):  # what is not finite is looked for
+    with np.errstate(all="ignore"):  # values that are not finite are checked below
         points, findings = _points(whole, backbone, own), list[Finding]()
     for one, label in zip(points, backbone.labels, strict=True):
         if not np.isfinite([one.k, one.motion, *one.errors]).all():
@@ -187,7 +194,7 @@ def backbone_levels(
 
 
 def dof_of_joint(whole: Assembly, dof: str | None) -> str:
-    """Return the joint DOF to be found: the one named, or the only one that has a law."""
+    """Return the named joint DOF, or the only DOF that has a law."""
     known = [a for a, b in whole.joint.laws if a == b]
     if dof is None and len(known) == 1:
         return known[0]
@@ -198,7 +205,7 @@ def dof_of_joint(whole: Assembly, dof: str | None) -> str:
 
 
 def _unknowns(whole: Assembly) -> Iterator[tuple[str, float | None, Callable[[float], Assembly]]]:
-    """Yield what is unknown of the models: name, standard deviation, the assembly with another value of it."""
+    """Yield name and standard deviation of each unknown of the models, and the assembly as a function of its value."""
     for side in ("a", "b"):
         part: Substructure = getattr(whole, side)
         for name, one in part.fitted.items():

@@ -17,48 +17,49 @@ from jointfrf.messages.finding import Finding, WithFindings, worst_first
 
 __all__ = ["DecayRecord", "ModalDecay", "decay_of_mode", "pooled"]
 
-#: Samples below which there is nothing to filter.
+#: Least number of samples of a record.
 _FEWEST = 64
-#: By how many of its steps a time may lie off a uniform grid: rounding in the file.
+#: Largest distance of a time from a uniform grid, in steps: rounding in the file.
 _UNEVEN = 0.1
 #: Kaiser window of the filter: side lobes of -80 dB, and half the width of its main lobe times its length.
 _BETA = 10.73
 _WIDTH = float(np.sqrt(_BETA**2 + np.pi**2) / np.pi)
-#: Share of the distance to the next thing in the spectrum that the filter may take.
+#: Bandwidth of the filter as a share of the distance to the next resonance, to 0 or to the image.
 _SHARE = 0.9
-#: Samples of the envelope in a length of the filter, between which noise is correlated, but not fully; the fewest of
-#: a fit, and the most.
+#: Samples of the envelope in a length of the filter, between which noise is partly correlated; fewest and most samples
+#: of a fit.
 _PER_FILTER, _LEAST, _MOST = 4, 12, 4000
-#: Orders of the polynomials of log amplitude and phase: the slope in the middle changes with odd ones. The first is one
-#: more than a stretch needs that shows no curvature of the slope; then the chance below which a higher one is taken.
+#: Orders of the polynomials of log amplitude and phase, odd because only odd terms change the slope in the middle. The
+#: first is one more than a stretch without curvature of the slope needs. Then the p-value below which a higher order is
+#: taken.
 _ORDER, _HIGHEST, _CHANGES = 3, 7, 0.05
-#: Chance below which an envelope is no smooth function of time, or sensors disagree; and the relative change of
-#: damping, by the last terms of the polynomial or between sensors, that is too much then.
+#: p-value below which an envelope is no smooth function of time, or sensors disagree; and the relative change of
+#: damping, by the last terms of the polynomial or between sensors, above which this is reported.
 _RARE, _TOO_MUCH = 1e-4, 0.1
 #: Amplitude over noise of the envelope below which a sensor is not used.
 _ABOVE_NOISE = 6.0
-#: Share of the largest envelope below which the free decay begins: before it a shaker may hold the motion.
+#: Share of the largest envelope below which the free decay begins; before it a shaker may drive the motion.
 _BEGINS = 0.9
-#: Prominence of a peak of a spectrum, dB, and degrees of freedom of the means that it is sought in: chance makes one
-#: of 10 dB in fewer than 1e-6 of the lines.
+#: Prominence of a peak of a spectrum, dB, and degrees of freedom of the averaged spectrum: noise makes a peak of 10 dB
+#: in fewer than 1e-6 of the lines.
 _PROMINENT, _FREEDOM = 10.0, 20
-#: Height below that of the mode, dB, at which a resonance need not be filtered out: its beat is part of the residual.
+#: Height in dB below the peak of the mode at which a resonance need not be filtered out.
 _WEAK = 40.0
 #: Relative distance between the frequency given and the peak taken.
 _NEAR = 0.1
-#: Displacement of other modes over that of this one above which they change the joint: the share of their square.
+#: Displacement of another mode over the displacement of this mode above which it changes the joint.
 _OTHERS = 0.3
-#: Steps of the fit.
+#: Largest number of steps of the fit.
 _STEPS = 8
-#: Levels over which the scatter of sensors is averaged: that of two sensors has one degree of freedom.
+#: Levels over which the scatter of sensors is averaged; with two sensors a level has one degree of freedom.
 _AROUND = 5
-#: Order of the polynomial in ln a that frequency and damping follow, and levels below which none is sought.
+#: Order of the polynomial in ln a of frequency and damping, and least number of levels for its scatter.
 _SMOOTH, _FEW_LEVELS = 5, 6
 
 
 @dataclass(frozen=True)
 class DecayRecord:
-    """A free decay as it was measured.
+    """Measured record of a free decay.
 
     Parameters
     ----------
@@ -227,16 +228,18 @@ class ModalDecay(WithFindings):
 
 
 def pooled(values: FloatArray, errors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return weighted means over sensors, their standard errors and chi-square; NaN are left out.
+    """Return weighted means over sensors, their standard errors and chi-square, without NaN.
 
     Parameters
     ----------
     values, errors : ndarray, shape (n, n_sensors)
+        Values of the sensors, and their standard errors.
 
     Returns
     -------
     tuple of ndarray, shape (n,)
-        Errors are wider by the root of chi-square over its degrees where sensors scatter by more than their errors.
+        Means, errors and chi-square. If sensors scatter by more than their errors, the errors are widened by the root
+        of chi-square over its degrees of freedom.
     """
     weight = np.where(np.isfinite(values), 1 / errors**2, 0.0)
     total = weight.sum(axis=1)
@@ -250,16 +253,17 @@ def pooled(values: FloatArray, errors: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def scatter_over_levels(log_amplitude: FloatArray, values: FloatArray, errors: FloatArray) -> tuple[float, float]:
-    """Return the standard deviation of values about a polynomial in ln a that errors do not explain, and its chance.
+    """Return the standard deviation of values about a polynomial in ln a beyond their errors, and its p-value.
 
     Parameters
     ----------
     log_amplitude, values, errors : ndarray, shape (n,)
+        Logarithm of the amplitudes, values and their standard errors.
 
     Returns
     -------
     tuple of float
-        0 and 1 for fewer than six levels.
+        Standard deviation and p-value; 0 and 1 for fewer than six levels.
     """
     from scipy.optimize import brentq
     from scipy.special import chdtrc
@@ -300,6 +304,7 @@ def decay_of_mode(
     Parameters
     ----------
     record : DecayRecord
+        Measured free decay.
     freq_hz : float
         Frequency of the mode, Hz, to 10 %: the nearest resonance of the record is taken.
     bandwidth : float, optional
@@ -314,12 +319,18 @@ def decay_of_mode(
     Returns
     -------
     ModalDecay
+        Frequency, damping and amplitude at each level.
 
     Raises
     ------
     ValueError
         No resonance near the frequency, sampling that is too coarse, a record too short for the filter, or no stretch
         above the noise in which the amplitude falls by `ratio`.
+
+    See Also
+    --------
+    decay_levels : stiffness and loss factor of a joint from decays.
+    backbone_levels : stiffness and loss factor of a joint from a backbone.
 
     Notes
     -----
@@ -328,7 +339,7 @@ def decay_of_mode(
     them. Stretches in which the amplitude falls by `ratio` follow each other. In each, exp(p) is fitted to z, with p a
     complex polynomial of third order, or of a higher one if it is significant (F test, 5 %). The fit is one of
     generalised least squares with the correlation of filtered noise. dp/dt in the middle is -decay + i omega.
-    Values of sensors are averaged by their variances, and errors widened where they scatter by more.
+    Values of sensors are averaged with the weight 1/variance, and errors are widened if the sensors scatter by more.
 
     Examples
     --------
@@ -357,7 +368,7 @@ def decay_of_mode(
             "bandwidth, or measure with less noise"
         )
     kept = _sound(found, record, own, others, envelope, findings)
-    if len(kept) < len(found) - len(kept):  # most of a record that is not one decaying mode says nothing of the rest
+    if len(kept) < len(found) - len(kept):  # most of the record is not one decaying mode
         why = "; ".join(one.text for one in findings)
         raise ValueError(f"{len(kept)} of {len(found)} levels at {own:.4g} Hz are usable: {why}")
     name = f"{own:.4g} Hz"
@@ -400,7 +411,7 @@ def _peaks(record: DecayRecord) -> tuple[FloatArray, FloatArray]:
 
 
 def _nearest(record: DecayRecord, freq_hz: float) -> tuple[float, FloatArray]:
-    """Return the resonance next to a frequency, and the others that are not weak beside it."""
+    """Return the resonance next to a frequency, and other resonances that are not weak compared with it."""
     if not (np.isfinite(freq_hz) and freq_hz > 0):
         raise ValueError(f"freq_hz is {freq_hz:g}; give a positive number of Hz")
     if freq_hz > 0.45 * record.rate:
@@ -504,7 +515,7 @@ def _stretches(envelope: _Envelope, first: int, ratio: float) -> Iterator[slice]
 
 
 class _Level(NamedTuple):
-    """Values of sensors in the middle of a stretch; the relative change of damping by terms that should not matter."""
+    """Values of sensors in the middle of a stretch; the relative change of damping by the last terms."""
 
     stretch: slice
     time: float
@@ -527,7 +538,7 @@ class _Fit(NamedTuple):
 
 
 def _level(envelope: _Envelope, stretch: slice) -> _Level | None:
-    """Return the level of a stretch; None where no sensor is above its noise."""
+    """Return the level of a stretch, or None if no sensor is above its noise."""
     from scipy.special import fdtrc
 
     thin = -(-(stretch.stop - stretch.start) // _MOST)
@@ -556,7 +567,7 @@ def _level(envelope: _Envelope, stretch: slice) -> _Level | None:
     slope = np.where(used, np.array([one.slope for one in own]), np.nan + 1j * np.nan)
     error = np.where(used, np.array([one.error for one in own]), np.nan)
     value, change = np.array([one.value for one in own]), 0.0
-    if order == _HIGHEST and chance_of(lower, own, used) < _RARE:  # what the last terms change, others would, too
+    if order == _HIGHEST and chance_of(lower, own, used) < _RARE:  # further terms would matter, too
         moved = np.nan_to_num(abs(slope - np.array([one.slope for one in lower])), nan=0.0, posinf=np.inf)
         error = np.hypot(error, moved)
         change = float(np.nanmax(moved / abs(slope.real)))
@@ -574,7 +585,7 @@ def _is_above(one: _Fit) -> bool:
 
 
 def _fit(z: ComplexArray, time: FloatArray, order: int, correlation: FloatArray) -> _Fit:
-    """Fit exp(polynomial) to an analytic signal whose noise has this correlation at the steps 0, 1, ..."""
+    """Fit exp(polynomial) to an analytic signal with the correlation of its noise at the steps 0, 1, ..."""
     from scipy.linalg import cholesky_banded, solve_banded
 
     n = z.size
@@ -625,7 +636,7 @@ def _sound(
     found: Sequence[_Level], record: DecayRecord, own: float, others: FloatArray, envelope: _Envelope,
     findings: list[Finding],
 ) -> list[_Level]:  # fmt: skip
-    """Return the levels that one smooth decaying mode explains; the others are named."""
+    """Return the levels that one smooth decaying mode explains, and name other levels in findings."""
     name, kept = f"{own:.4g} Hz", list[_Level]()
     rough, rising, mixed = list[float](), list[float](), list[tuple[float, float, float]]()
     for one in found:
@@ -657,7 +668,7 @@ def _places(times: Sequence[float]) -> dict[str, float]:
 def _largest(
     record: DecayRecord, one: _Level, own: float, others: FloatArray, envelope: _Envelope
 ) -> tuple[float, float]:
-    """Return the largest displacement of another mode over that of this one, and its frequency, in a stretch."""
+    """Return the largest ratio of another mode's displacement to this mode's in a stretch, and its frequency."""
     if not others.size:
         return 0.0, own
     first, last = (np.searchsorted(record.time, envelope.time[i]) for i in (one.stretch.start, one.stretch.stop - 1))
@@ -674,7 +685,7 @@ def _largest(
 
 
 def _disagreement(name: str, kept: Sequence[_Level]) -> Iterator[Finding]:
-    """Yield a finding where sensors scatter by more than their noise, and by more than shapes change."""
+    """Yield a finding if sensors scatter by more than their noise, and by more than shapes change."""
     from scipy.special import chdtrc
 
     decay, error = (np.array([getattr(one, part) for one in kept]) for part in ("decay", "error"))

@@ -1,4 +1,4 @@
-"""Free decays of modes, turned into stiffness and loss factor of a joint by models of the assembly."""
+"""Stiffness and loss factor of a joint from free decays of modes, by models of the assembly."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def decay_levels(
     laws: Iterable[str] = AMPLITUDE_LAWS,
     probability: float = 0.95,
 ) -> JointLevels:
-    """Turn free decays of one or several modes into k(a) and eta(a) of a joint DOF, by models of the assembly.
+    """Return k(a) and eta(a) of a joint DOF from free decays of modes, by models of the assembly.
 
     Parameters
     ----------
     whole : Assembly
-        Models of both parts, and the joint except the DOF that is found.
+        Models of both parts, and the joint except the DOF to be identified.
     decays : ModalDecay or sequence of ModalDecay
-        Of `decay_of_mode`.
+        Modes over amplitude from `decay_of_mode`.
     channels : mapping of str to str, optional
         DOF of the models by the name of the sensor, ``{"acc1": "A/1:y", "acc2": "-B/25:y"}``; by default the names of
         sensors are DOFs. Sensors without a DOF are not used.
@@ -51,32 +51,38 @@ def decay_levels(
         Relative standard errors of frequency and damping that all levels share, in addition to the unknowns of the
         models, default (0.001, 0).
     laws : iterable of str
-        As in `fit_amplitude_laws`; none if it is empty.
+        Names of the laws to fit (see `fit_amplitude_laws`), default all; empty for no fit.
     probability : float
         Coverage probability of the intervals, default 0.95.
 
     Returns
     -------
     JointLevels
+        Stiffness and loss factor at each level of the decays, and the laws.
 
     Raises
     ------
     ValueError
-        No sensor is a DOF of the models; else as `backbone_levels`.
+        No sensor is a DOF of the models; a substructure given by FRFs, or a DOF or channel that does not exist.
+
+    See Also
+    --------
+    decay_of_mode : frequency and damping over amplitude from a record.
+    backbone_levels : stiffness and loss factor from a backbone.
 
     Notes
     -----
-    A sensor with the displacement x of the first harmonic sees the modal amplitude q = x/phi, phi its part of the mode
-    scaled by mass. The energy of the mode changes by dE = omega dJ with the action J = omega q^2/2, and a cycle loses
-    pi Im(K*) a^2 in the joint. So the damping of the linear mode that K*(a) would have is
+    A sensor with the displacement x of the first harmonic has the modal amplitude q = x/phi, where phi is its component
+    of the mass-normalised mode. The energy of the mode changes by dE = omega dJ with the action J = omega q^2/2. A
+    cycle loses pi Im(K*) a^2 in the joint. So the damping of the linear mode that K*(a) would have is
 
         zeta omega = -d ln(x)/dt + d ln(phi)/dt - 1/2 d ln(omega)/dt
 
     This is less than the decay rate if the frequency rises while the amplitude falls. phi follows K* along the levels.
     It comes from receptances, y across the open joint and c from there to the sensor, as phi^2 = c^2 / (dy/d(omega^2)).
     The square of d ln(omega)/d ln(a), the order of the terms left out, widens the error of the frequency.
-    Damping is averaged over the sensors by their variances, and errors widened where they scatter by more. K* = -1/y
-    at the complex frequency, as in `backbone_levels`; the relative motion is that which fits all sensors.
+    Damping is averaged over the sensors with the weight 1/variance, and errors are widened if the sensors scatter by
+    more. K* is -1/y at the complex frequency, as in `backbone_levels`. The relative motion is fitted to all sensors.
 
     Examples
     --------

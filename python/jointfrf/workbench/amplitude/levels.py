@@ -1,4 +1,4 @@
-"""A joint at several levels: stiffness and loss factor over amplitude, from one fit each."""
+"""Stiffness and loss factor of a joint over amplitude, from a fit at each level."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from jointfrf.workbench.amplitude.lines import DofLines, Drive, lines_of_fit, wi
 
 __all__ = ["JointLevel", "JointLevels", "check_laws", "levels", "of_levels"]
 
-#: Chance below which K* is taken to change over the lines of a test, and to do so in a way that no power of ln a
-#: follows: then there is a warning, which must not befall one linear test in a hundred.
+#: p-values below which K* changes over the lines of a test, and below which it departs from every power of ln a. The
+#: second one causes a warning, so it is far below 1 in 100 linear tests.
 _CHANGES, _BENT = 0.05, 1e-4
-#: Powers of ln a that are fitted at most.
+#: Highest power of ln a that is fitted.
 _MOST = 3
-#: Amplitudes of the fit that differ from those of the one before by less than this, e-fold, are found.
+#: Change of the logarithm of the amplitudes between fits below which the iteration has converged.
 _SETTLED, _ROUNDS = 0.02, 4
 
 
@@ -40,17 +40,16 @@ class JointLevel:
     label : str
         Name of the test.
     amplitude : float
-        Of the relative motion, peak, m or rad, at which the stiffness was found; the geometric mean over the lines by
-        their weight in the fit.
+        Peak relative motion to which the stiffness belongs, m or rad: the geometric mean over the lines with their
+        weight in the fit.
     lowest, highest : float
-        Between which 95 % of that weight lie.
+        Limits of the amplitudes with 95 % of the weight, m or rad.
     order : int
-        Up to which power of ln a K* was found to change over the lines; stiffness and loss factor are those at
-        `amplitude`.
+        Highest power of ln a by which K* changes over the lines; stiffness and loss factor are values at `amplitude`.
     force : float
-        In the joint, peak, N or N m: |K*| times the amplitude.
+        Peak force in the joint, N or N m: |K*| times the amplitude.
     stiffness, loss_factor : Derived
-        With standard error and interval; N/m or N m/rad, and 1.
+        Values at `amplitude` with standard error and interval; N/m or N m/rad, and 1.
     common : dict of str to (float, float)
         Parts of both standard errors that all levels share, with their signs, by the unknown of the models.
     """
@@ -73,18 +72,18 @@ class JointLevels(WithFindings):
     Attributes
     ----------
     levels : dict of str to tuple of JointLevel
-        By DOF, lowest amplitude first.
+        Levels by DOF, lowest amplitude first.
     laws : dict of str to AmplitudeLawFits
-        Of the DOFs that have levels enough.
+        Fitted laws by DOF, for DOFs with enough levels.
     left_out : dict of str to str
-        Tests that the command could not read or fit, by their files, and why.
+        Reason for each test that the command could not read or fit, by file.
     findings : tuple of Finding
+        Warnings about fits and levels.
     probability : float
-        Of the intervals.
+        Coverage probability of the intervals.
     joints : dict of str to LawJoint
-        The joint at each level, by the labels of tests: springs of the secant stiffness in place of what was found,
-        the rest as it was fitted. `write_joint` keeps it, `LawJoint.export` writes cards. None where a stiffness is
-        not positive.
+        Joint at each level, by the labels of tests: the fitted joint with springs of the secant stiffness. Levels whose
+        stiffness is not positive are left out. `write_joint` writes it to a file, `LawJoint.export` writes cards.
     """
 
     levels: dict[str, tuple[JointLevel, ...]]
@@ -95,7 +94,7 @@ class JointLevels(WithFindings):
     joints: dict[str, LawJoint] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        """Return a table of each DOF, that of its laws, and the findings."""
+        """Return a table of each DOF, a table of its laws, and the findings."""
         parts = []
         for dof, own in self.levels.items():
             parts.append("\n".join(columns_of(level_rows(dof, own, self.probability))))
@@ -130,44 +129,50 @@ def levels(
     laws: Iterable[str] = AMPLITUDE_LAWS,
     probability: float = 0.95,
 ) -> JointLevels:
-    """Put fits of one joint at several levels together: k(a) and eta(a) over amplitude and force in the joint.
+    """Return k(a) and eta(a) of a joint from its fits at several levels, over amplitude and force in the joint.
 
     Parameters
     ----------
     fits : sequence of Fit
-        One for each level, of `identify` or `identify_model`, as they were made (not loaded); with `accept` if
-        the amplitude changes over the lines, under a force held.
+        Fits by `identify` or `identify_model`, one for each level (not loaded from files). With a constant force, use
+        `accept` if the amplitude changes over the lines.
     drives : sequence of Drive
-        What was held in each test.
+        Controlled quantity of each test.
     labels : sequence of str, optional
-        Names of the tests; by default their numbers.
+        Names of the tests, default their numbers.
     laws : iterable of str
-        Laws over amplitude that are fitted, as in `fit_amplitude_laws`; none where it is empty.
+        Names of the laws to fit (see `fit_amplitude_laws`), default all; empty for no fit.
     probability : float
-        Of the intervals.
+        Coverage probability of the intervals, default 0.95.
 
     Returns
     -------
     JointLevels
+        Stiffness and loss factor at each level, and the laws.
 
     Raises
     ------
     ValueError
-        Numbers of fits, drives and labels that differ; a fit without FRFs; a drive that does not belong to its fit; a
-        joint without springs.
+        Numbers of fits, drives and labels that differ; a fit without FRFs, a drive that does not belong to its fit, or
+        a joint without springs.
+
+    See Also
+    --------
+    fit_amplitude_laws : laws from stiffness and loss factor.
+    decay_levels : stiffness and loss factor from free decays.
+    write_levels : page of the levels.
 
     Notes
     -----
-    The relative motion on each line is that of the fit, times the force of that line. A fit of a constant K* to a joint
-    whose K* goes with ln a gives its value at the mean of ln a, weighted by what each line adds to the parameter: this
-    is the amplitude of the level, free of an error of first order.
+    The relative motion on each line is the motion that the fit predicts, times the force on the line. If K* is linear
+    in ln a, a fit of a constant K* gives the value of K* at the weighted mean of ln a. The weight of a line is its
+    contribution to the parameter. This mean is the amplitude of the level, without an error of first order.
 
-    Where the amplitude changes over the lines by more than 1 %, fits with models are made again with K* linear in
-    ln a, of the second and third power where these show (chance below 5 %, by the residual projected on dH/dK* times
-    the next power beside all parameters); values are those at the amplitude of the level. What the powers miss, or all
-    of it where there are no models, is a random departure of K* on each of some classes of amplitude. Its variance is
-    estimated from the residual (moments), and belongs to the intervals, which then cover K* over the amplitudes of the
-    test. A chance of the departures below 1e-4 is a warning.
+    If the amplitude changes over the lines by more than 1 %, fits with models are repeated with K* linear in ln a. The
+    second and third power are added if they are significant (5 %, score test with all parameters). Values are taken at
+    the amplitude of the level. The departure of K* from the powers (without models, from a constant) is a random effect
+    on classes of amplitude. Its variance is estimated from the residual by moments. The intervals include it, so that
+    they cover K* over the amplitudes of the test. A p-value of the departures below 1e-4 causes a warning.
 
     Examples
     --------
@@ -218,9 +223,9 @@ def of_levels(
     share: float,
     around: Mapping[str, LawJoint | None],
 ) -> JointLevels:
-    """Return levels in the order of their amplitude, with laws fitted to them where there are any to fit.
+    """Return levels in the order of their amplitude, with the laws fitted to them.
 
-    `around` is the joint of each test beside the springs that were found.
+    `around` is the joint of each test without the identified springs.
     """
     ordered = {dof: tuple(sorted(own, key=lambda one: one.amplitude)) for dof, own in found.items()}
     of_laws: dict[str, AmplitudeLawFits] = {}
@@ -242,7 +247,7 @@ def of_levels(
 
 
 def _secant(found: Mapping[str, Sequence[JointLevel]], label: str, around: LawJoint | None) -> LawJoint | None:
-    """Return the joint of a test with springs of its secant stiffness; None where one is not positive."""
+    """Return the joint of a test with springs of its secant stiffness, or None if one is not positive."""
     own = {dof: one for dof, levels in found.items() for one in levels if one.label == label}
     if min(one.stiffness.value for one in own.values()) <= 0:
         return None
@@ -267,7 +272,7 @@ def _labels(fits: Sequence[Fit], drives: Sequence[Drive], labels: Sequence[str] 
 
 
 class _Followed(NamedTuple):
-    """A fit whose K* follows the amplitude: its lines and orders in ln a by DOF; where K* departs from them."""
+    """A fit whose K* depends on amplitude: lines and orders in ln a by DOF, and departures of K* from them."""
 
     fit: Fit
     lines: dict[str, DofLines]
@@ -276,7 +281,7 @@ class _Followed(NamedTuple):
 
 
 def _followed(fit: Fit, drive: Drive) -> _Followed:
-    """Let K* follow the amplitude over the lines: linear in ln a where it changes, of higher powers where they show."""
+    """Return the fit with K* linear in ln a if the amplitude changes, or of higher order if it is significant."""
     lines = lines_of_fit(fit, drive)
     orders = dict.fromkeys(lines, 0)
     for dof in lines:
@@ -298,7 +303,7 @@ def _followed(fit: Fit, drive: Drive) -> _Followed:
 def _refitted(
     fit: Fit, lines: dict[str, DofLines], drive: Drive, orders: dict[str, int]
 ) -> tuple[Fit, dict[str, DofLines]] | None:
-    """Fit with K* of these orders in ln a, until the amplitudes are those of the fit."""
+    """Fit K* with these orders in ln a, and repeat until the amplitudes no longer change."""
     for _ in range(_ROUNDS):
         found = with_amplitude(fit, lines, {dof: order for dof, order in orders.items() if order})
         if found is None:
@@ -314,7 +319,7 @@ def _refitted(
 
 
 def _of_fit(one: _Followed, label: str) -> list[Finding]:
-    """Return what is in doubt of a fit, but for how K* goes with amplitude, which is followed and no result."""
+    """Return the findings of a fit, except findings about the change of K* with amplitude, which the fit includes."""
     own = {each.name for each in one.fit.parameters if each.origin == "joint" and each.kind not in ("k", "h", "c", "m")}
     found = (each for each in one.fit.findings if each.severity != "note" and each.code != "amplitude-dependent")
     return [replace(each, test=label) for each in found if not own & set(each.about)]
@@ -333,7 +338,7 @@ def _level(one: _Followed, dof: str, label: str, share: float) -> JointLevel:
     lossy = " + ".join(f"{factor}{{{name}}}" for name, factor in terms.items() if name in names)
     if lossy:
         eta = fit.derived(f"({lossy}) / {{k_{dof}}}", share)
-    else:  # the fit has no damping of this DOF: that of its residual
+    else:  # the fit has no damping of this DOF: use the damping in its residual
         mean, error = own.departures(order).mean
         eta = _normal(mean.imag / k.value, error / abs(k.value), share)
     excess = own.excess(order)
@@ -369,7 +374,7 @@ def _common(fit: Fit, dof: str, omega: float, eta: float) -> dict[str, tuple[flo
 
 
 def _over_classes(one: _Followed, dof: str, k: float, eta: float, expected: ComplexArray) -> ComplexArray:
-    """Return K* on the classes of amplitude: by the powers of ln a of the fit, and by what they miss."""
+    """Return K* on the classes of amplitude: the polynomial in ln a of the fit, plus the expected departures."""
     order = one.orders[dof]
     x, value = one.lines[dof].departures(order).x, one.fit.value
     powers = (
@@ -379,7 +384,7 @@ def _over_classes(one: _Followed, dof: str, k: float, eta: float, expected: Comp
 
 
 def _with_range(one: Derived, values: FloatArray) -> Derived:
-    """Return a value whose interval contains others."""
+    """Return a value whose interval contains further values."""
     return one._replace(low=min(one.low, float(values.min())), high=max(one.high, float(values.max())))
 
 
@@ -389,7 +394,7 @@ def _normal(value: float, error: float, share: float) -> Derived:
 
 
 def _wider(one: Derived, error: float, degrees: float, share: float) -> Derived:
-    """Return a value with another error, independent, whose variance was estimated."""
+    """Return a value whose interval includes a further independent error with estimated variance."""
     if not error > 0:
         return one
     reach = float(stdtrit(degrees, (1 + share) / 2)) * error
@@ -398,7 +403,7 @@ def _wider(one: Derived, error: float, degrees: float, share: float) -> Derived:
 
 
 def _usable(own: Sequence[JointLevel]) -> tuple[list[JointLevel], str]:
-    """Return the levels to which laws can be fitted, and what the others are."""
+    """Return the levels to which laws can be fitted, and a description of the excluded levels."""
     good = [one for one in own if one.stiffness.std_error > 0 and one.loss_factor.std_error > 0]
     left = [one.label for one in own if one not in good]
     return good, f"{', '.join(left)}: stiffness or damping has no standard error" if left else ""

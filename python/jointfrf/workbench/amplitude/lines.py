@@ -1,4 +1,4 @@
-"""What a fit saw of a joint at which amplitude: motion, weight of each line, and how stiffness goes with amplitude."""
+"""Amplitude of a joint in a fit: motion and weight of each line, and dependence of the stiffness on amplitude."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from jointfrf.spelling import did_you_mean
 
 __all__ = ["Bend", "DofLines", "Drive", "lines_of_fit", "with_amplitude"]
 
-#: Amplitudes that differ by less than this, e-fold, are one.
+#: Difference of ln a below which amplitudes are equal.
 _HELD = 0.01
-#: Classes of amplitude beyond those that the powers of ln a take: complex degrees of freedom of the departures.
+#: Complex degrees of freedom of the departures: number of classes of amplitude beyond the number of powers of ln a.
 _CLASSES = 4
-#: Lines that a class has at least.
+#: Least number of lines of a class.
 _LINES = 3
 #: Eigenvalues of an information below this share of the largest are rounding.
 _RANK = 1e-10
@@ -36,18 +36,18 @@ Held = Literal["force", "response", "joint"]
 
 @dataclass(frozen=True)
 class Drive:
-    """What was held during a test, on all its lines.
+    """Quantity that a test controls to one level on all lines.
 
     Parameters
     ----------
     held : {"force", "response", "joint"}
-        The force; the motion of a channel; the relative motion in the joint.
+        Controlled quantity: the force, the motion of a channel, or the relative motion in the joint.
     level : float
-        Peak value: N (N m), m, m/s or m/s^2, rad.
+        Peak value of the quantity: N (N m), m, m/s or m/s^2, rad.
     channel : str
-        The channel that was held, as the fit names it, or the joint DOF.
+        Name of the controlled channel in the fit, or the joint DOF.
     quantity : {"displacement", "velocity", "acceleration"}
-        Of the channel.
+        Kind of motion of the channel.
 
     Examples
     --------
@@ -87,15 +87,16 @@ class Drive:
 
 
 class AmplitudeSpring(JointLaw):
-    """A spring whose K* is a polynomial of ln a, the amplitude on each line being known.
+    """A spring whose K* is a polynomial of ln a, with a known amplitude on each line.
 
     Parameters
     ----------
     spring : SpringLaw
+        Spring at the reference amplitude.
     omega : ndarray, shape (n_freq,)
-        rad/s, rising.
+        Angular frequency, rad/s, rising.
     x : ndarray, shape (n_freq,)
-        ln a less that at which K* is that of the spring.
+        Logarithm of the amplitude over the reference amplitude.
     terms : tuple of float
         Real and imaginary part of the factors of x, x^2/2, ...
     """
@@ -105,7 +106,7 @@ class AmplitudeSpring(JointLaw):
 
     @property
     def fields(self) -> tuple[LawField, ...]:
-        """Those of the spring, then ``k1``, ``h1``, ..."""
+        """Fields of the spring, then ``k1``, ``h1``, ..."""
         names = [f"{part}{i}" for i in range(1, len(self.terms) // 2 + 1) for part in "kh"]
         return (*self.spring.fields, *(LawField(name, "stiffness") for name in names))
 
@@ -137,14 +138,14 @@ class AmplitudeSpring(JointLaw):
 
 
 class Bend(NamedTuple):
-    """How K* goes with amplitude on the lines of one test.
+    """Dependence of K* on amplitude over the lines of one test.
 
     Attributes
     ----------
     slope : complex
-        By which K* goes with a power of ln a.
+        Coefficient of a power of ln a in K*.
     p_value : float
-        Of a joint that does not depend on amplitude.
+        p-value under the hypothesis that the joint does not depend on amplitude.
     """
 
     slope: complex
@@ -152,7 +153,7 @@ class Bend(NamedTuple):
 
 
 class Excess(NamedTuple):
-    """What departures of K* from a polynomial of ln a add to the uncertainty at one amplitude.
+    """Uncertainty at one amplitude due to departures of K* from a polynomial of ln a.
 
     Attributes
     ----------
@@ -161,7 +162,7 @@ class Excess(NamedTuple):
     degrees : float
         Degrees of freedom of the variance.
     p_value : float
-        Chance of such departures if there are none.
+        p-value of the departures.
     expected : ndarray, shape (n,)
         Complex departures of the classes, given their variance.
     """
@@ -195,19 +196,19 @@ class Departures:
 
     @property
     def mean(self) -> tuple[complex, float]:
-        """The mean departure by one step from the fit, and the standard error of its imaginary part."""
+        """Mean departure by one step from the fit, and the standard error of its imaginary part."""
         columns = np.kron(np.eye(2), np.ones((self.x.size, 1)))
         inverse = _inverse(columns.T @ self.information @ columns)
         step = inverse @ columns.T @ self.score
         return complex(step[0], step[1]), math.sqrt(inverse[1, 1])
 
     def excess(self, order: int, x: float) -> Excess:
-        """Return what departures from a polynomial of this order add at the amplitude x.
+        """Return the uncertainty at the amplitude x due to departures from a polynomial of this order.
 
-        K* of the classes is X beta + u, u ~ N(0, v): with W the information and P the projection on what X leaves in
-        its metric, E(Q) = degrees + v trace(P) gives v (DerSimonian and Laird). Given v, K* of a class has the
-        precision W + M/v, M the projection on what X leaves of u. What its variance exceeds that for v = 0 by, and
-        the square of its expected departure, are added.
+        K* of the classes is X beta + u, u ~ N(0, v). With the information W and the projection P on the complement of X
+        in its metric, E(Q) = degrees + v trace(P) gives v (DerSimonian and Laird). Given v, the precision of K* of a
+        class is W + M/v, where M, for u, is the projection on the complement of X in its metric. The result is the
+        increase of the variance over v = 0, plus the square of the expected departure.
         """
         from scipy.special import fdtrc
 
@@ -242,12 +243,13 @@ class DofLines:
     Attributes
     ----------
     amplitude : ndarray, shape (n_freq, n_i)
-        Of the relative motion, peak, m or rad, with each force by itself.
+        Peak relative motion for each force alone, m or rad.
     weights : ndarray, shape (2, n_freq, n_i)
-        By which K* of a line enters the stiffness found, and its imaginary part the damping found; sums are 1.
+        Weights of K* of each line in the fitted stiffness, and of its imaginary part in the fitted damping; sums are 1.
     omega : float
-        Where viscous damping was seen, rad/s.
+        Angular frequency to which viscous damping belongs, rad/s.
     source : _ModelLines or _JointLines
+        Residual and derivatives of the fit.
     """
 
     amplitude: FloatArray
@@ -257,27 +259,27 @@ class DofLines:
 
     @property
     def mean_amplitude(self) -> float:
-        """Amplitude at which the stiffness was found.
+        """Amplitude to which the fitted stiffness belongs.
 
-        K* that is linear in ln a gives the same fit as one that is constant and has its value there. Beside unknowns
-        of the models weights have both signs, and it may lie outside the amplitudes of the lines: then K* is to be
-        fitted as a function of ln a about `centre`.
+        A fit of a constant K* to a joint whose K* is linear in ln a gives the value of K* at this amplitude. If the
+        models have unknowns, weights have both signs, and the amplitude may be outside the amplitudes of the lines.
+        Then fit K* as a function of ln a about `centre`.
         """
         return float(np.exp(np.sum(self.weights[0] * np.log(self.amplitude))))
 
     @property
     def is_held(self) -> bool:
-        """Whether the amplitude is the same on all lines, within 1 %: K* then changes by no more."""
+        """Whether the amplitude is the same on all lines within 1 %, so that K* changes by no more."""
         return float(np.ptp(np.log(self.amplitude))) < _HELD
 
     @property
     def centre(self) -> float:
-        """Geometric mean of the amplitudes by what each line says of the stiffness, whatever its sign."""
+        """Geometric mean of the amplitudes, weighted by the magnitude of each line's weight in the stiffness."""
         size = abs(self.weights[0])
         return float(np.exp(np.sum(size * np.log(self.amplitude)) / size.sum()))
 
     def range(self, share: float = 0.95) -> tuple[float, float]:
-        """Return the amplitudes between which lines have this share of the weight in the stiffness."""
+        """Return the limits of the amplitudes with this share of the weight in the stiffness."""
         size, order = abs(self.weights[0]).ravel(), np.argsort(self.amplitude, axis=None)
         part = np.cumsum(size[order]) / size.sum()
         a = self.amplitude.ravel()[order]
@@ -285,7 +287,7 @@ class DofLines:
         return float(a[low]), float(a[min(high, a.size - 1)])
 
     def bend(self, power: int = 1) -> Bend:
-        """Return how K* goes with a power of ln a, found beside all parameters of the fit."""
+        """Return the dependence of K* on a power of ln a, estimated together with all parameters of the fit."""
         x = np.log(self.amplitude / self.centre) ** power
         if self.is_held:
             return Bend(0j, 1.0)
@@ -294,7 +296,7 @@ class DofLines:
     def classes(self, order: int) -> NDArray[np.intp]:
         """Return the class of amplitude of each line and force, by the mean of shares of information and of number.
 
-        There is one class where the amplitude is held or lines are few.
+        There is one class if the amplitude is constant or lines are few.
         """
         count = min(order + 1 + _CLASSES, len(self.amplitude) // _LINES)
         if self.is_held or count <= order + 1:
@@ -311,17 +313,17 @@ class DofLines:
         return self.source.departures(np.log(self.amplitude / self.centre), self.classes(order))
 
     def excess(self, order: int) -> Excess:
-        """Return what departures of K* from a polynomial add to the uncertainty at `mean_amplitude`."""
+        """Return the uncertainty at `mean_amplitude` due to departures of K* from a polynomial."""
         return self.departures(order).excess(order, math.log(self.mean_amplitude / self.centre))
 
 
 def lines_of_fit(fit: Fit, drive: Drive) -> dict[str, DofLines]:
-    """Return what a fit saw of each DOF of the joint that is a spring, by its name.
+    """Return amplitudes and weights of the lines of a fit for each DOF that is a spring, by its name.
 
     Raises
     ------
     ValueError
-        The fit has no FRFs behind it, or the drive does not belong to it.
+        The fit has no FRFs, or the drive does not belong to it.
     """
     motion = _model_lines(fit, fit.data) if isinstance(fit.data, ModelData) else _joint_lines(fit)
     force = _force(fit, drive, motion)
@@ -346,7 +348,7 @@ class _Motion(NamedTuple):
 
 
 def _force(fit: Fit, drive: Drive, motion: _Motion) -> FloatArray:
-    """Return the force as measured on each line, shape (n_freq, n_i) or (1, 1)."""
+    """Return the force on each line, shape (n_freq, n_i) or (1, 1)."""
     if drive.held == "force":
         return np.full((1, 1), drive.level)
     names = fit.dofs if drive.held == "joint" else motion.names
@@ -365,7 +367,7 @@ def _force(fit: Fit, drive: Drive, motion: _Motion) -> FloatArray:
 
 
 def _parameters(fit: Fit, dof: str) -> tuple[int, int | None] | None:
-    """Return the places of stiffness and damping of a DOF; None where it is not a spring whose stiffness is finite."""
+    """Return the indices of stiffness and damping of a DOF, or None if it is not a spring of finite stiffness."""
     own = {
         one.kind: i for i, one in enumerate(fit.parameters) if one.origin == "joint" and one.row == one.column == dof
     }
@@ -379,7 +381,7 @@ def _parameters(fit: Fit, dof: str) -> tuple[int, int | None] | None:
 
 @dataclass(frozen=True)
 class _ModelLines:
-    """A DOF of a fit with models: `slopes` by K* of the weighted FRFs, those by the coordinates, covariance."""
+    """A DOF of a fit with models: derivatives of weighted FRFs by K* (`slopes`) and by coordinates; covariance."""
 
     slopes: ComplexArray
     of_fit: ComplexArray
@@ -389,7 +391,7 @@ class _ModelLines:
     of_joint: tuple[int, ...]
 
     def departures(self, x: FloatArray, codes: NDArray[np.intp]) -> Departures:
-        """By the residual projected on dH/dK* of each class, less what all but the parameters of this DOF explain."""
+        """Project the residual on dH/dK* of each class, less the part that parameters except this DOF's explain."""
         count = int(codes.max()) + 1
         rows = [(self.slopes * (codes == one)[:, None, :] * unit).ravel() for unit in (1.0, 1j) for one in range(count)]
         added = np.ascontiguousarray(rows).view(np.float64)
@@ -423,7 +425,7 @@ class _ModelLines:
         return np.array([found[0], found[-1]])
 
     def bend(self, x: FloatArray) -> Bend:
-        """By the score: what the residual has of K* in proportion to x, less what other parameters explain of it."""
+        """Test the score of K* in proportion to x, less the part that other parameters explain."""
         rows = [(self.slopes * x[:, None, :] * unit).ravel() for unit in (1.0, 1j)]
         added = np.ascontiguousarray(rows).view(np.float64)
         own = np.ascontiguousarray(self.of_fit).reshape(len(self.of_fit), -1).view(np.float64)
@@ -437,14 +439,14 @@ class _ModelLines:
 
 @dataclass(frozen=True)
 class _JointLines:
-    """A DOF of a fit at the joint: K* of each line by itself less that of the fit, and its share of what is known."""
+    """A DOF of a fit at the joint: K* of each line less K* of the fit, and the line's share of the information."""
 
     difference: ComplexArray
     shares: FloatArray
     per_force: FloatArray
 
     def departures(self, x: FloatArray, codes: NDArray[np.intp]) -> Departures:
-        """By the mean of K* of the lines of each class; a line is of the class of the force that moves it most."""
+        """Average K* over the lines of each class; a line belongs to the class of the force that moves it most."""
         weight = self.weights()[0]
         line = np.arange(len(weight))
         force = np.argmax(self.per_force, axis=1)
@@ -472,7 +474,7 @@ class _JointLines:
         return np.array([one / one.sum() for one in own])
 
     def bend(self, x: FloatArray) -> Bend:
-        """By a straight line through K* of the lines over ln a."""
+        """Fit a straight line to K* of the lines over ln a."""
         weight = self.weights()[0]
         share = weight.sum(axis=1)
         mean = np.sum(weight * x, axis=1) / np.where(share > 0, share, 1)
@@ -489,7 +491,7 @@ class _JointLines:
 
 
 def _bend(information: FloatArray, score: FloatArray, squares: float, degrees: int) -> Bend:
-    """Return slopes by information and score of both, tested against what is then left of the squares."""
+    """Return slopes from information and score, tested against the remaining sum of squares."""
     from scipy.special import fdtrc
 
     slope = np.linalg.lstsq(information, score, rcond=1e-10)[0]
@@ -546,7 +548,7 @@ def _joint_lines(fit: Fit) -> _Motion:
 
 
 def with_amplitude(fit: Fit, lines: dict[str, DofLines], orders: dict[str, int]) -> Fit | None:
-    """Return the fit with K* as polynomials of ln a of these orders; None where it has no models to be fitted again."""
+    """Return the fit with K* as polynomials of ln a of these orders, or None if the fit has no models."""
     if not isinstance(fit.data, ModelData) or fit.laws is None:
         return None
     omega, laws = 2 * np.pi * fit.freq_hz, dict(fit.laws.laws)

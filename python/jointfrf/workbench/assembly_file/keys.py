@@ -50,15 +50,15 @@ def without_sign(dof: str) -> tuple[str, int]:
 
 
 class PriorKeys(Keys):
-    """What is believed of an unknown number; without `std` only the FRFs determine it."""
+    """Prior of an unknown number; without `std` only the FRFs determine it."""
 
-    mean: Annotated[float | None, key("What is believed.", absent="the number given beside it")] = None
-    std: Annotated[Positive | None, key("Standard deviation of that belief.", absent="no prior")] = None
+    mean: Annotated[float | None, key("Mean of the prior.", absent="the number given for it")] = None
+    std: Annotated[Positive | None, key("Standard deviation of the prior.", absent="no prior")] = None
     lower: Annotated[float | None, key("Smallest value.", absent="0; none of a Poisson's ratio")] = None
     upper: Annotated[float | None, key("Largest value.", absent="none")] = None
 
 
-#: What is believed of an unknown number.
+#: Prior of an unknown number.
 Prior = Positive | PriorKeys
 _TAKES = "relative standard deviation, or a table { mean, std, lower, upper }"
 _Prior = Annotated[Prior, key("An unknown number.", takes=_TAKES)]
@@ -81,7 +81,7 @@ def _unknown(which: str, words: str = _WORDS) -> Any:
     )  # fmt: skip
 
 
-#: Numbers that are unknown, with what is believed of each, or by words.
+#: Unknown numbers with their priors, or words for usual priors.
 Unknowns = dict[str, Prior] | tuple[str, ...]
 _OfFactors = Annotated[
     dict[str, _Prior] | tuple[str, ...], _unknown(f"`youngs_modulus`, `density`, `loss_factor`; {_SCALED}")
@@ -114,7 +114,7 @@ class ChainPart(ChainKeys, tag="chain"):
 
 
 class BeamPart(BeamKeys, tag="beam"):
-    """Beam elements in a line, bending in one plane; DOFs `"1:y"`, `"1:theta"`, ... without those that are held."""
+    """Beam elements in a line, bending in one plane; DOFs `"1:y"`, `"1:theta"`, ..., without the supported ones."""
 
     joint: _JointDofs
     unknown: _OfNumbers = field(default_factory=dict)
@@ -144,9 +144,9 @@ class BrickBeamPart(BrickBeamKeys, tag="brick-beam"):
 
 
 class MatricesPart(MatricesKeys, tag="matrices"):
-    """Matrices of your own: Matrix Market (`.mtx`), or NPZ of `scipy.sparse.save_npz` or `numpy.savez`.
+    """Matrices from your files: Matrix Market (`.mtx`), or NPZ of `scipy.sparse.save_npz` or `numpy.savez`.
 
-    An NPZ file holds one array, or arrays named like the keys here. Files are relative to the file that names them.
+    An NPZ file contains one array, or arrays named like the keys here. Files are relative to the file that names them.
     """
 
     joint: _JointDofs
@@ -158,8 +158,8 @@ class MatricesPart(MatricesKeys, tag="matrices"):
 class ReceptancesPart(ReceptancesKeys, tag="receptances"):
     """FRFs of the part, measured or computed elsewhere, in any format that `jointfrf.io.read_frfs` reads.
 
-    They must be there on the lines of the measurement, between all DOFs that are used. Their noise is in the weights
-    and intervals of a fit.
+    The file must contain them on the lines of the measurement, between all DOFs that are used. Weights and intervals
+    of a fit include their noise.
     """
 
     joint: _JointDofs
@@ -172,8 +172,8 @@ class ReceptancesPart(ReceptancesKeys, tag="receptances"):
 class ModesPart(ModesKeys, tag="modes"):
     """Modes of the part, measured or computed: datasets 55 and 2414 of Universal Files, or arrays in NPZ files.
 
-    They are taken as exact. All modes near the band must be there, and `residuals` for those beyond it: FRFs at a
-    joint depend on them.
+    They are taken as exact. Give all modes near the band, and `residuals` for modes beyond it: FRFs at a joint depend
+    on them.
     """
 
     joint: _JointDofs
@@ -212,7 +212,7 @@ PartKeys = ChainPart | BeamPart | PlatePart | BrickBeamPart | RigidBodyPart | Ma
 
 
 class MassKeys(Keys):
-    """A mass that the models do not have: a sensor, a shaker's head."""
+    """A mass that is not in the models: a sensor, the head of a shaker."""
 
     header = "[[mass]]"
     dofs: Annotated[
@@ -224,7 +224,7 @@ class MassKeys(Keys):
 
 
 class GroundKeys(Keys):
-    """A spring to the ground: a suspension, a clamp that gives way, the stinger of a shaker."""
+    """A spring to the ground: a suspension, a flexible clamp, the stinger of a shaker."""
 
     header = "[[ground]]"
     dof: Annotated[str, key("Where it holds: `A/1:theta`.", example="A/1:theta")]
@@ -242,7 +242,7 @@ _Grounds = Annotated[tuple[GroundKeys, ...], key("Springs to the ground.")]
 
 
 class ChannelDofs(Keys):
-    """The DOFs of a channel of a measurement whose sensor and impact differ; a side that is not named is not used."""
+    """DOFs of a channel of a measurement whose sensor and impact differ; without its key, one is not used."""
 
     header = "a channel of [channels]"
     response: Annotated[str | None, key("DOF of the sensor: `A/30:-z`.", absent="not used")] = None
@@ -278,7 +278,7 @@ _ForceGains = Annotated[
 
 
 class AssemblyKeys(Keys):
-    """Two parts A and B, the joint between them, what is unknown, and which channel of a measurement is which DOF.
+    """Two parts A and B, the joint between them, the unknowns, and the DOFs of the channels of a measurement.
 
     DOFs are named by their part: `A/7:y`, `B/1:theta`.
     """
@@ -328,7 +328,7 @@ class PlacedJointKeys(Keys):
 
 
 class AlikeKeys(Keys):
-    """Joints whose parameters scatter about common means, which are named by NAME."""
+    """Joints whose parameters scatter about common means, named by NAME."""
 
     header = "[alike.NAME]"
     joints: Annotated[tuple[str, ...], key("Their names.", min_length=2, example=["left", "right"])]
@@ -339,7 +339,7 @@ class AlikeKeys(Keys):
 
 
 class PartsKeys(Keys):
-    """Any number of parts and joints by names; what else there is is that of two parts.
+    """Any number of parts and joints by names; all other keys are the keys for two parts.
 
     DOFs are named by their part, `frame/7:y`, parameters by their joint, `bolt.k_y`.
     """

@@ -1,4 +1,4 @@
-"""FRFs of a test with the assembly of a file: which channel is which DOF, and the fit."""
+"""FRFs of a test with the assembly of a file: DOFs of the channels, and the fit."""
 
 from __future__ import annotations
 
@@ -32,18 +32,20 @@ __all__ = ["MeasuredAssembly", "joint_words", "measured_assembly"]
 
 @dataclass(frozen=True)
 class MeasuredAssembly:
-    """FRFs of a test, and the assembly that they were measured on.
+    """FRFs of a test, and the measured assembly.
 
     Attributes
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Lines, Hz.
     h : ndarray, shape (n_freq, n_o, n_i)
         Receptances, m/N; NaN for an FRF that was not measured.
     assembly : Assembly
+        Assembly with its unknowns.
     responses, forces : tuple of str
-        DOFs ``"A/7:y"`` of its rows and columns.
+        DOFs ``"A/7:y"`` of the rows and columns of `h`.
     response_gains, force_gains : dict of str to Unknown
+        Unknown gains by DOF.
     fixed : tuple of str
         Parameters of the joint that keep their value.
     channels : tuple of two dicts of str to str
@@ -51,12 +53,15 @@ class MeasuredAssembly:
     unused : tuple of str
         Channels of the file that are not used.
     coherence : ndarray, shape (n_freq, n_o, n_i), or None
+        Coherence if it is known for all FRFs.
     averages : float or None
+        Number of averages if it is known for all FRFs.
     parts : dict of str to AssemblyPart
+        Parts by name.
     located : tuple of str
-        Which node each position of the file is.
+        Descriptions of the node at each position of the file.
     setups : SetUps, optional
-        Which FRF came from which set-up of the test.
+        Set-ups of the test to which the FRFs belong.
     """
 
     freq_hz: FloatArray
@@ -77,14 +82,14 @@ class MeasuredAssembly:
 
     @property
     def sketched(self) -> tuple[SketchedPart, ...]:
-        """All parts as `write_report` draws them."""
+        """Parts for the drawing of `write_report`."""
         return tuple(part.sketched(name, self.assembly.joints) for name, part in self.parts.items())
 
     def describe(self) -> list[str]:
-        """Say in words what a sketch shows, and what the files of the parts hold, line by line.
+        """Return a description of the assembly and the files of its parts, line by line.
 
-        Where the joint is, and what is measured, driven and attached at which node; which node each position is;
-        mass, centre of gravity, rigid motions, natural frequencies of parts from files, and what looks wrong.
+        The description lists places of joints, nodes with responses, forces and attachments, and nodes of positions.
+        For parts from files it lists mass, centre of gravity, rigid motions, natural frequencies and possible errors.
         """
         parts = self.parts
         lines = [*joint_words(self.assembly.joints, parts), *columns_of(_node_rows(self, parts)), *self.located]
@@ -99,18 +104,18 @@ class MeasuredAssembly:
         find_wrong_channels: bool = False,
         accept: Sequence[str] = (),
     ) -> Fit:
-        """Identify the joint, as `identify_model` does.
+        """Identify the joint by `identify_model`, and return the fit.
 
         Parameters
         ----------
         noise : float or StatedNoise, optional
-            Relative noise of the FRFs, or relative part and floors; estimated from them by default.
+            Relative noise of the FRFs, or relative part and floors; default an estimate from the FRFs.
         sensor_mass : float, optional
-            Mass of the accelerometer that moves from point to point, kg; found by default.
+            Mass of the accelerometer that moves from point to point, kg; default an estimate from the FRFs.
         find_wrong_channels : bool
-            Whether to look for a channel of the opposite sign, or two exchanged ones.
+            Whether to search for a channel of the opposite sign, or two exchanged channels; default False.
         accept : sequence of str
-            Codes of errors of the data at which the fit does not stop.
+            Codes of errors of the data at which the fit does not stop, default none.
         """
         coherence, averages = (None, None) if noise is not None else (self.coherence, self.averages)
         return identify_model(
@@ -122,12 +127,12 @@ class MeasuredAssembly:
 
 
 def joint_words(joints: Mapping[str, PlacedJoint], parts: Mapping[str, AssemblyPart]) -> list[str]:
-    """Say between which nodes each joint acts, where they are, and how."""
+    """Return a line for each joint with its nodes, their places and its directions."""
     return [_joint_words(name, one, parts) for name, one in joints.items()]
 
 
 def _joint_words(name: str, one: PlacedJoint, parts: Mapping[str, AssemblyPart]) -> str:
-    """Say between which nodes a joint acts, where they are, and how."""
+    """Return a line with the nodes of a joint, their places and its directions."""
     ends = []
     for dofs in (one.j, one.k):
         nodes = dict.fromkeys(dof.rpartition(":")[0] for dof in dofs)
@@ -152,7 +157,7 @@ def _numbers(at: FloatArray) -> str:
 
 
 def _node_rows(own: MeasuredAssembly, parts: Mapping[str, AssemblyPart]) -> list[tuple[str, ...]]:
-    """Return a row for each node where something is measured, driven or attached."""
+    """Return a row for each node with a response, a force or an attachment."""
     what: dict[str, list[str]] = {}
     for kind, channels in zip(("response", "force"), own.channels, strict=True):
         for dof, channel in channels.items():
@@ -178,26 +183,31 @@ def _node_rows(own: MeasuredAssembly, parts: Mapping[str, AssemblyPart]) -> list
 def measured_assembly(
     path: Path | str, frfs: FrfSet, *, bands: list[tuple[float, float]] | None = None
 ) -> MeasuredAssembly:
-    """Read `assembly.toml` for the FRFs of a test.
+    """Return the assembly of `assembly.toml` with the FRFs of a test.
 
     Parameters
     ----------
     path : Path or str
-        The file: parts, joint, what is unknown, channels.
+        Path of the file with parts, joint, unknowns and channels.
     frfs : FrfSet
-        As `jointfrf.io.read_frfs` returns them; mobilities and accelerances become receptances.
+        FRFs from `jointfrf.io.read_frfs`; mobilities and accelerances become receptances.
     bands : list of (low, high), optional
-        Hz; all lines by default.
+        Bands of the lines that are used, Hz; default all lines.
 
     Returns
     -------
     MeasuredAssembly
-        `MeasuredAssembly.fit` identifies the joint.
+        Assembly and FRFs. `MeasuredAssembly.fit` identifies the joint.
 
     Raises
     ------
     FileContentError
-        Something in the file is missing or wrong, all missing keys at once; or it does not fit the FRFs.
+        The file has missing keys (all are listed) or wrong values, or does not fit the FRFs.
+
+    See Also
+    --------
+    identify_model : fit of FRFs with models of the parts.
+    read_part : one part from a file.
 
     Examples
     --------
@@ -247,7 +257,7 @@ def _setups(frfs: FrfSet, at: tuple[np.ndarray, ...], signs: np.ndarray, kept: n
 
 
 def _quality(frfs: FrfSet, at: tuple[np.ndarray, ...]) -> tuple[FloatArray | None, float | None]:
-    """Return coherence and number of averages where they are known of all FRFs used."""
+    """Return coherence and number of averages, or None for each that is not known for all FRFs used."""
     if frfs.coherence is None:
         return None, None
     coherence = np.ascontiguousarray(frfs.coherence[at])
@@ -263,7 +273,7 @@ def _unused(frfs: FrfSet, named: tuple[dict[str, str], ...]) -> tuple[str, ...]:
 
 
 def _dofs(file: AssemblyFile, parts: Mapping[str, AssemblyPart], frfs: FrfSet, side: int) -> dict[str, tuple[int, int]]:
-    """Return for each DOF the number of its channel and its sign, in the order of the file of FRFs.
+    """Return number and sign of the channel of each DOF, in the order of the file of FRFs.
 
     Responses are side 0, forces are side 1.
     """
@@ -282,7 +292,7 @@ def _dofs(file: AssemblyFile, parts: Mapping[str, AssemblyPart], frfs: FrfSet, s
 
 
 def _stated(file: AssemblyFile, parts: Mapping[str, AssemblyPart], side: int) -> dict[Channel, tuple[str, int]]:
-    """Return DOF and sign of the channels under [channels], and of the opposite ones."""
+    """Return DOF and sign of the channels under [channels], and of the opposite channels."""
     table = file.keys.table.table("channels")
     mapping: dict[Channel, tuple[str, int]] = {}
     seen: dict[Channel, str] = {}
@@ -304,7 +314,7 @@ def _stated(file: AssemblyFile, parts: Mapping[str, AssemblyPart], side: int) ->
 
 
 def _named_alike(parts: Mapping[str, AssemblyPart], file: AssemblyFile, channel: Channel) -> tuple[str, int]:
-    """Return the DOF of a part that is named like a channel; empty if there is none."""
+    """Return the DOF of a part with the name of a channel, or an empty text."""
     words = [f"{channel.node}:{channel.axis}", f"{channel.node}:{direction_names([channel.axis])[0]}"]
     words += [f"{channel.node}:theta"] if channel.is_rotation else []
     found = []

@@ -30,10 +30,11 @@ class ModalStructure(Structure):
     Attributes
     ----------
     modes : ModalFrfs
+        FRFs between all DOFs by modes.
     about : tuple of str
-        What the file holds.
+        Description of the file.
     nodes : dict of str to ndarray, shape (3,)
-        Where nodes are, m.
+        Places of nodes, m.
     """
 
     modes: ModalFrfs
@@ -50,7 +51,7 @@ class ModalStructure(Structure):
         self.index([*joint, *internal])
 
     def index(self, dofs: Sequence[str]) -> list[int]:
-        """Return DOFs, counted from 0; raises ValueError."""
+        """Return indices of DOFs, or raise ValueError."""
         number = {dof: i for i, dof in enumerate(self.modes.dofs)}
         missing = [dof for dof in dofs if dof not in number]
         if missing:
@@ -65,8 +66,8 @@ class ModalStructure(Structure):
 class ModesKeys(SubstructureKeys, tag="modes"):
     """Modes of the part, measured or computed: datasets 55 and 2414 of Universal Files, or arrays in NPZ files.
 
-    They are taken as exact. All modes near the band must be there, and `residuals` for those beyond it: FRFs at a
-    joint depend on them.
+    They are taken as exact. Give all modes near the band, and `residuals` for modes beyond it: FRFs at a joint depend
+    on them.
     """
 
     file: Annotated[
@@ -113,7 +114,7 @@ class ModesKeys(SubstructureKeys, tag="modes"):
         if found.is_rigid.any() and found.modal_mass is None:
             raise self.wrong("file", "complex modes at 0 Hz have no scale; leave them out and add residuals")
         file = self._node_file(found)
-        if self.nodes is not None and not found.has_nodes:  # those of the modes' own file are turned
+        if self.nodes is not None and not found.has_nodes:  # shapes in the file of the modes are already in its axes
             dofs = file.named(dofs)
         length = 1.0 if file.is_si or self.units is None else model_units(self.units).length
         places = {node: length * at for node, at in file.coordinates.items()}
@@ -142,7 +143,7 @@ class ModesKeys(SubstructureKeys, tag="modes"):
         return names
 
     def _node_file(self, found: ModesFile) -> NodeFile:
-        """Return the nodes: those of their own file, whose turned directions are not of the modes, or of the modes."""
+        """Return the nodes of a separate file, without its turned directions, or of the file of the modes."""
         if self.nodes is None and not found.has_nodes:
             return NodeFile()
         name = "file" if self.nodes is None else "nodes"
@@ -152,7 +153,7 @@ class ModesKeys(SubstructureKeys, tag="modes"):
         return file
 
     def _with_residuals(self, whole: ModalStructure) -> tuple[ModalFrfs, list[str]]:
-        """Return the modes with residuals of measured FRFs, and what these cover."""
+        """Return the modes with residuals of measured FRFs, and a description of their range."""
         frfs = read_frf_file(self, "residuals", mapping=self.map, unit=self.unit)
         held = [[_named(f"{one.node}:{one.axis}") for one in own] for own in (frfs.responses, frfs.excitations)]
         names = [dof for dof in dict.fromkeys([*held[0], *held[1]]) if dof in whole.modes.dofs]
@@ -175,7 +176,7 @@ class ModesKeys(SubstructureKeys, tag="modes"):
 
 
 def _named(dof: str) -> str:
-    """Return a DOF with the name of its direction as all have it."""
+    """Return a DOF with the standard name of its direction."""
     node, mark, direction = dof.rpartition(":")
     try:
         return f"{node}{mark}{direction_names([direction])[0]}" if mark else dof

@@ -1,4 +1,4 @@
-"""From `assembly.toml` to an assembly with what is unknown of it."""
+"""From `assembly.toml` to an assembly with its unknowns."""
 
 from __future__ import annotations
 
@@ -68,9 +68,9 @@ __all__ = [
     "unknown_of",
 ]
 
-#: What a word takes as relative standard deviation: coefficients of variation of structural steel (JCSS Probabilistic
-#: Model Code, parts 2.1 and 3.2); damping is guessed; sections are rolled or milled to 1 %, lengths cut to 1 mm in
-#: 0.3 m; a spring to the ground is known by its order of magnitude.
+#: Relative standard deviation that a word stands for: coefficients of variation of structural steel (JCSS
+#: Probabilistic Model Code, parts 2.1 and 3.2); damping is guessed; sections are rolled or milled to 1 %, lengths cut
+#: to 1 mm in 0.3 m; a spring to the ground is known by its order of magnitude.
 _USUAL = {
     "youngs_modulus": 0.03, "density": 0.01, "poisson": 0.03, "loss_factor": 0.5, "height": 0.01, "width": 0.01,
     "thickness": 0.01, "length": 0.003, "length_scale": 0.003, "stiffness": 0.5, "damping": 1.0,
@@ -85,8 +85,9 @@ class NamedDof(NamedTuple):
     Attributes
     ----------
     dof : str
+        Name of the DOF.
     away : float or None
-        How far the node is from the position that was given, m.
+        Distance of the node from the given position, m.
     """
 
     dof: str
@@ -102,12 +103,14 @@ def _changed(keys: Any, **values: Any) -> Any:
 
 @dataclass(frozen=True)
 class AssemblyPart:
-    """A substructure as the file has it.
+    """A substructure of a file.
 
     Attributes
     ----------
     keys : PartKeys
+        Keys of the part.
     structure : Structure
+        Model, modes or FRFs of the part.
     """
 
     keys: PartKeys
@@ -115,13 +118,13 @@ class AssemblyPart:
 
     @classmethod
     def of_keys(cls, keys: PartKeys, freq_hz: FloatArray) -> AssemblyPart:
-        """Read the files of a part; FRFs must be available on these lines, Hz. Its joint DOFs are named by nodes."""
+        """Return a part from its keys, with joint DOFs by nodes; FRFs must be available on these lines, Hz."""
         part = cls(keys, keys.structure(freq_hz))
         joint = tuple(keys.build(lambda dof=dof: named_dof(part, dof).dof, "joint") for dof in keys.joint)  # type: ignore[misc]
         return part if joint == keys.joint else cls(_changed(keys, joint=joint), part.structure)
 
     def has(self, dof: str) -> bool:
-        """Whether there is a DOF of this name."""
+        """Return whether the part has this DOF."""
         try:
             if isinstance(self.structure, ModelStructure):
                 self.structure.model.ports(dof)
@@ -135,7 +138,7 @@ class AssemblyPart:
             return False
 
     def has_region(self, dof: str) -> bool:
-        """Whether this is the motion of a region, on which a joint acts per length or area."""
+        """Return whether the DOF is the motion of a region, on which a joint acts per length or area."""
         model = self.structure.model if isinstance(self.structure, ModelStructure) else None
         return isinstance(model, PointModel) and bool(model.region_ports(dof))
 
@@ -148,18 +151,18 @@ class AssemblyPart:
 
     @property
     def places(self) -> dict[str, FloatArray]:
-        """Where its nodes and reference points are, m, as far as it is known."""
+        """Known places of nodes and reference points, m."""
         return self.structure.places
 
     @property
     def joint_patch(self) -> PointPatch | None:
-        """The patch of nodes whose reference point all its joint DOFs are of; None where there is none."""
+        """Patch of nodes whose reference point has all joint DOFs, or None."""
         nodes = {dof.rpartition(":")[0] for dof in self.keys.joint}
         patches = self.structure.patches if isinstance(self.structure, ModelStructure) else ()
         return next((one for one in patches if nodes == {one.name}), None)
 
     def sketched(self, letter: str, joints: Mapping[str, PlacedJoint]) -> SketchedPart:
-        """Return it as a sketch draws it."""
+        """Return the part for a sketch."""
         from jointfrf.workbench.report.sketch import SketchedPart  # reports take their time to import
 
         at: dict[str, list[str]] = {}
@@ -170,7 +173,7 @@ class AssemblyPart:
         return SketchedPart(letter, self.places, at)
 
     def describe(self) -> list[str]:
-        """Say what shows that files hold the right thing, line by line; nothing of parts that are built or of FRFs."""
+        """Return properties that help to check the files of a part, line by line; empty for built models and FRFs."""
         if isinstance(self.structure, ModalStructure):
             return list(self.structure.about)
         if not isinstance(self.structure, ModelStructure) or not self.structure.about:
@@ -179,11 +182,11 @@ class AssemblyPart:
         return [self.structure.about, *facts.lines(), *(f"warning: {text}" for text in facts.findings)]
 
     def receptance(self, freq_hz: ArrayLike, dofs: Sequence[str]) -> ComplexArray:
-        """Return the receptances between DOFs as believed, shape (n_freq, m, m), m/N."""
+        """Return the nominal receptances between DOFs, shape (n_freq, m, m), m/N."""
         return self.structure.receptance(as_frequency(freq_hz), dofs)
 
     def substructure(self, freq_hz: FloatArray, dofs: Sequence[str]) -> Substructure:
-        """Return the substructure with its unknowns; of FRFs, those between its joint and these DOFs."""
+        """Return the substructure with its unknowns; measured FRFs are restricted to its joint and these DOFs."""
         keys = self.keys
         if isinstance(keys, ReceptancesPart | ModesPart):
             named = list(dict.fromkeys([*keys.joint, *dofs]))
@@ -204,7 +207,7 @@ class AssemblyPart:
         return keys.build(lambda: Substructure(lambda **values: self._model(values), *known))
 
     def _priors(self) -> Mapping[str, Prior]:
-        """Return what is unknown by the names of the numbers of this part."""
+        """Return the priors by the names of the numbers of this part."""
         keys = self.keys
         assert not isinstance(keys, ReceptancesPart | ModesPart)
         takes = ["length_scale"] if isinstance(keys, MatricesPart) else []
@@ -246,12 +249,12 @@ def _numbers_of(keys: PartKeys) -> dict[str, float]:
 
 
 def named_dof(part: AssemblyPart, dof: str) -> NamedDof:
-    """Return a DOF by the name of its node: ``@0.3,0.006,0:y`` is that of the nearest node which has it.
+    """Return a DOF by the name of its node: ``@0.3,0.006,0:y`` is the DOF of the nearest node which has it.
 
     Raises
     ------
     ValueError
-        A position that is none, or places of nodes that are not known; a node that is far away.
+        The position is invalid, places of nodes are unknown, or the nearest node is far away.
     """
     if not dof.startswith("@"):
         return NamedDof(dof)
@@ -283,22 +286,27 @@ def named_dof(part: AssemblyPart, dof: str) -> NamedDof:
 
 
 def read_part(path: Path | str) -> AssemblyPart:
-    r"""Read a part by itself: `part.toml` holds what `[A]` of `assembly.toml` holds.
+    r"""Return a single part from `part.toml`, whose keys are the keys of `[A]` in `assembly.toml`.
 
     Parameters
     ----------
     path : path-like
-        A TOML file with the keys of one part; files that it names are relative to its folder.
+        Path of a TOML file with the keys of one part. Paths in it are relative to its folder.
 
     Returns
     -------
     AssemblyPart
-        Its DOFs by `has`, places of nodes and points by `places`, FRFs by `receptance`, for a fit `substructure`.
+        Part with DOFs (`has`), places of nodes and points (`places`), FRFs (`receptance`), and for fits `substructure`.
 
     Raises
     ------
     FileContentError
-        One sentence that names the file and the key; all keys that are missing.
+        A key is missing or wrong; the message names the file and all missing keys.
+
+    See Also
+    --------
+    measured_assembly : an assembly from a file, with FRFs of a test.
+    Substructure : a part of an assembly for fits.
 
     Examples
     --------
@@ -318,12 +326,12 @@ def read_part(path: Path | str) -> AssemblyPart:
 
 
 def read_structure(table: TomlTable) -> ModelStructure | ModalStructure:
-    """Read a model, or modes, from a table with the keys of a substructure of a case or of a part of an assembly.
+    """Return a model, or modes, from a table with the keys of a substructure of a case or of a part of an assembly.
 
     Parameters
     ----------
     table : TomlTable
-        With ``joint`` it is a part, of which the joint and the unknown numbers are not used.
+        Table of a substructure, or with ``joint`` of a part, whose joint and unknowns are not used.
 
     Raises
     ------
@@ -339,7 +347,7 @@ def read_structure(table: TomlTable) -> ModelStructure | ModalStructure:
 
 
 def _by_name(own: Unknowns, takes: Sequence[str], meant: Mapping[str, str], table: TomlTable) -> dict[str, Prior]:
-    """Return priors by the name of the number; those of words are usual ones."""
+    """Return priors by the name of the number; words give the usual priors."""
     found: dict[str, Prior] = {}
     for word in own:
         name = meant.get(word, word)
@@ -361,11 +369,12 @@ def scaled_model(model: Model, *, length_scale: float, **factors: float) -> Mode
     Parameters
     ----------
     model : Model
+        Nominal model.
     length_scale : float
-        s: forces and displacements of a solid body, or of a beam with its section, have stiffnesses in proportion to s
-        and masses to s^3, and rotations are displacements over a length.
+        Factor s of all lengths. Stiffnesses of a solid body, or of a beam with its section, are proportional to s and
+        masses to s^3; rotations are displacements over a length.
     factors : float
-        ``youngs_modulus`` and ``density`` as factors, ``loss_factor``.
+        Factors ``youngs_modulus`` and ``density``, and the value ``loss_factor``.
     """
     turns = np.array([is_rotation(dof.rpartition(":")[2]) for dof in model.dofs])
     of_dof = sp.diags_array(np.where(turns, length_scale, 1.0))
@@ -376,7 +385,7 @@ def scaled_model(model: Model, *, length_scale: float, **factors: float) -> Mode
         found = of_dof @ sp.csr_array(matrix) @ of_dof * factor
         return found if sp.issparse(matrix) else found.toarray()
 
-    if isinstance(model, PointModel):  # motions that are shown, of the DOFs and per length where they are rotations
+    if isinstance(model, PointModel):  # shown motions follow the DOFs; rotations are per length
         of_turn = {name: 1 / length_scale if is_rotation(name.rpartition(":")[2]) else 1.0 for name in model.shown}
         model = replace(
             model,
@@ -395,7 +404,7 @@ def scaled_model(model: Model, *, length_scale: float, **factors: float) -> Mode
 
 
 def unknown_of(prior: Prior, value: float, table: TomlTable, name: str, lower: float = 0.0) -> Unknown:
-    """Return what is believed of a number; raises FileContentError."""
+    """Return an unknown with its prior, or raise FileContentError."""
     if not isinstance(prior, PriorKeys):
         if value == 0:
             raise table.wrong(name, "the value is 0 and has no relative standard deviation; give { mean, std }")
@@ -407,18 +416,20 @@ def unknown_of(prior: Prior, value: float, table: TomlTable, name: str, lower: f
 
 @dataclass(frozen=True)
 class AssemblyFile:
-    """What `assembly.toml` says.
+    """Content of `assembly.toml`.
 
     Attributes
     ----------
     keys : AssemblyKeys or PartsKeys
+        Keys of the file.
     part_keys : dict of str to PartKeys
-        Those of A and B, or of parts by their names.
+        Keys of A and B, or of parts by name.
     joint : LawJoint or None
-        That of two parts.
+        Joint of two parts.
     joints : dict of str to PlacedJoint
-        Those of several parts.
+        Joints of several parts.
     path : Path
+        Path of the file.
     """
 
     keys: AssemblyKeys | PartsKeys
@@ -432,12 +443,12 @@ class AssemblyFile:
         return {name: AssemblyPart.of_keys(keys, freq_hz) for name, keys in self.part_keys.items()}
 
     def located(self, parts: Mapping[str, AssemblyPart]) -> tuple[AssemblyFile, tuple[str, ...]]:
-        """Return the same with DOFs by nodes instead of positions, and which node each position is.
+        """Return the content with DOFs by nodes instead of positions, and a description of the node of each position.
 
         Raises
         ------
         FileContentError
-            No node is there.
+            A position has no node.
         """
         said: dict[str, None] = {}
 
@@ -481,7 +492,7 @@ class AssemblyFile:
         return replace(self, keys=changed, part_keys=keys, joints=joints), tuple(said)
 
     def check_values(self) -> None:
-        """Raise a FileContentError where a law has no values: a fit starts anywhere, a plan needs what is expected."""
+        """Raise FileContentError if a law has no values, which a plan needs and a fit does not."""
         if isinstance(self.keys, PartsKeys):
             tables = [(name, _inside(self.keys.table, "joints", name)) for name in self.joints]
         else:
@@ -509,7 +520,7 @@ class AssemblyFile:
         return tuple(found)
 
     def assembly(self, freq_hz: FloatArray, parts: Mapping[str, AssemblyPart], channels: Sequence[str]) -> Assembly:
-        """Return the assembly, of which FRFs between some DOFs are wanted; raises FileContentError."""
+        """Return the assembly for FRFs between some DOFs, or raise FileContentError."""
         attachments = self.attachments()
         used = [*channels, *(dof for one in attachments for dof in one.places)]
         keys, joint, sides = self.keys, self.joint, {}
@@ -518,7 +529,7 @@ class AssemblyFile:
             for dof in own.joint:
                 if not (part.has(dof) or (joint is None and part.has_region(dof))):
                     raise own.wrong("joint", f"{name} has no DOF {dof!r}{part.similar(dof)}")
-            if joint is not None and len(own.joint) == len(joint.dofs):  # else it is said how many there must be
+            if joint is not None and len(own.joint) == len(joint.dofs):  # otherwise the error states the number
                 own.build(lambda own=own: check_joint_order("", own.joint, joint.dofs), "joint")  # type: ignore[misc]
             begin = f"{name}/"
             here = [dof.removeprefix(begin) for dof in used if dof.startswith(begin)]
@@ -532,7 +543,7 @@ class AssemblyFile:
 
 
 def _groups(keys: PartsKeys) -> list[tuple[str, ...]]:
-    """Return groups of what is the same; names alone are one."""
+    """Return groups of equal things; a list of names is one group."""
     names = [one for one in keys.same if isinstance(one, str)]
     groups = [one for one in keys.same if not isinstance(one, str)]
     if names and groups:
@@ -554,12 +565,12 @@ def _inside(table: TomlTable, key: str, name: str) -> TomlTable:
 
 
 def read_assembly_file(path: Path) -> AssemblyFile:
-    """Read `assembly.toml`.
+    """Return the content of `assembly.toml`.
 
     Raises
     ------
     FileContentError
-        One sentence that names the file, the table and the key; all keys that are missing.
+        A key is missing or wrong; the message names the file, the table and all missing keys.
     """
     table = read_toml(path)
     if "parts" not in table.content and "joints" not in table.content:
@@ -603,7 +614,7 @@ def _part_of(table: TomlTable, name: str, joints: Mapping[str, PlacedJoint]) -> 
 
 
 def _joint_of(keys: Keys, key: str) -> LawJoint:
-    """Return the joint of the file that a key names."""
+    """Return the joint in the file that a key names."""
     named = keys.file_of(key)
     joint = keys.build(lambda: read_joint(named), key)
     return LawJoint.of_joint(joint) if isinstance(joint, Joint) else joint
@@ -615,7 +626,7 @@ def _joint_of_table(table: TomlTable) -> LawJoint:
 
 
 def _with_values(table: TomlTable) -> TomlTable:
-    """Return a table of a joint in which every law has values: the fit starts anywhere."""
+    """Return a table of a joint with values for every law, because a fit does not need them."""
     laws = table.content.get("law")
     if not isinstance(laws, list) or not all(isinstance(one, dict) for one in laws):
         return table
@@ -630,7 +641,7 @@ def _is_bare(law: Mapping[str, Any]) -> bool:
 def check_dofs(
     parts: Mapping[str, AssemblyPart], keys: AssemblyKeys | PartsKeys, name: str, dofs: Sequence[str]
 ) -> None:
-    """Raise a FileContentError for a DOF that no part has."""
+    """Raise FileContentError for a DOF that no part has."""
     whose = "neither A nor B has" if list(parts) == ["A", "B"] else f"none of {', '.join(parts)} has"
     for dof in dofs:
         part, _, own = dof.partition("/")

@@ -1,4 +1,4 @@
-"""Parts as models of the sides of a joint that bend: which DOF of a part each channel of a test is."""
+"""Parts as models of flexible sides of a joint: DOFs of the part for the channels of a test."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from jointfrf.workbench.assembly_file.read import AssemblyPart, read_part
 
 __all__ = ["PlacedChannel", "SidePart", "read_side"]
 
-#: A channel is taken to the nearest node of a part up to this distance, m; it is said from the second one on.
+#: Largest distance of a channel from the nearest node of a part, m, and distance above which it is reported.
 _FARTHEST, _AT_IT = 0.01, 1e-4
 
 
@@ -28,10 +28,11 @@ class PlacedChannel:
     Attributes
     ----------
     channel : Channel
+        Name of the channel.
     direction : ndarray, shape (3,)
-        Unit vector of its motion or force.
+        Unit vector of the motion or force.
     position : ndarray, shape (3,), or None
-        From the reference point of the joint, m; None where it is not known.
+        Position from the reference point of the joint, m; None if it is unknown.
     """
 
     channel: Channel
@@ -46,8 +47,9 @@ class SidePart:
     Attributes
     ----------
     model : SideModel
+        Model of the side, with the DOFs of the channels.
     text : tuple of str
-        What shows that the file holds the right thing, and which channel is at which node.
+        Properties that help to check the file, and channels at a distance from their nodes.
     """
 
     model: SideModel
@@ -57,27 +59,28 @@ class SidePart:
 def read_side(
     path: Path, freq_hz: FloatArray, responses: Sequence[PlacedChannel], forces: Sequence[PlacedChannel], n: int
 ) -> SidePart:
-    """Read `part.toml` and find the channels of a side in it.
+    """Return the part of `part.toml` as the model of a side, with the DOFs of its channels.
 
     Parameters
     ----------
     path : Path
-        The table of one part, as in `assembly.toml`; its `joint` is at the reference point.
+        Path of a file with the table of one part, as in `assembly.toml`; its `joint` is at the reference point.
     freq_hz : ndarray, shape (n_freq,)
         Lines of the test, Hz.
     responses, forces : sequence of PlacedChannel
+        Channels of the side.
     n : int
-        Joint DOFs.
+        Number of joint DOFs.
 
     Raises
     ------
     FileContentError
-        Something in the file is missing or wrong; a channel is no DOF of the part, by its name or by its place.
+        A key is missing or wrong, or a channel is no DOF of the part by its name or place.
 
     Notes
     -----
-    Where the nodes of a part have places, its joint is taken to the reference point of the test: channels are found by
-    the place relative to it, at the nearest node; else by their names, node and direction.
+    If the nodes of a part have places, its joint is at the reference point of the test, and a channel belongs to the
+    nearest node by its relative position. Otherwise node and direction in its name determine the DOF.
     """
     part = read_part(path)
     if len(part.keys.joint) != n:
@@ -94,7 +97,7 @@ def read_side(
         found.append(named)
     names = [dof for own in found for channel in own for dof in channel]
     substructure = part.substructure(freq_hz, names)
-    # The eigenvalue of a mode holds both errors, of its stiffness and of its mass.
+    # The eigenvalue of a mode contains the errors of its stiffness and of its mass.
     modes = {} if substructure.model_error is None else {"modes": np.sqrt(2) * substructure.model_error}
     model = part.keys.build(lambda: SideModel(substructure, tuple(found[0]), tuple(found[1]), **modes))
     text = [f"side by {path}: {len(responses)} responses, {len(forces)} excitations", *part.describe()]
@@ -103,7 +106,7 @@ def read_side(
 
 
 def _node(part: AssemblyPart, channel: PlacedChannel, origin: FloatArray | None, path: Path) -> tuple[str, float]:
-    """Return the node of a channel, and how far it is away."""
+    """Return the node of a channel, and its distance."""
     by_name = str(channel.channel.node)
     if origin is None or channel.position is None or channel.channel.is_rotation:
         return by_name, 0.0
@@ -113,8 +116,8 @@ def _node(part: AssemblyPart, channel: PlacedChannel, origin: FloatArray | None,
     if apart[nearest] > _FARTHEST:
         where = ", ".join(f"{1e3 * x:.4g}" for x in channel.position)
         raise FileContentError(
-            f"{path}: no node is at channel {channel.channel}, ({where}) mm from the joint; the nearest, "
-            f"{names[nearest]}, is {1e3 * apart[nearest]:.3g} mm away; correct the position"
+            f"{path}: channel {channel.channel} at ({where}) mm from the joint is {1e3 * apart[nearest]:.3g} mm away "
+            f"from the nearest node, {names[nearest]}; correct the position"
         )
     return names[nearest], float(apart[nearest])
 
@@ -129,6 +132,6 @@ def _dof(part: AssemblyPart, node: str, channel: PlacedChannel, path: Path) -> M
     for direction in weights:
         if not part.has(f"{node}:{direction}"):
             raise FileContentError(
-                f"{path}: DOF {node}:{direction} of channel {channel.channel} is missing; add it to the model"
+                f"{path} has no DOF {node}:{direction} for channel {channel.channel}; add it to the model"
             )
     return {f"{node}:{direction}": weight for direction, weight in weights.items()}

@@ -1,4 +1,4 @@
-"""`assembly.toml` to begin with."""
+"""Template of `assembly.toml`."""
 
 from __future__ import annotations
 

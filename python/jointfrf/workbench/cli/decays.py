@@ -72,7 +72,7 @@ def modes_of_decay(args: LevelsArguments, path: Path) -> list[ModalDecay]:
 def levels_of_decays(
     args: LevelsArguments, model: Path, modes: Sequence[ModalDecay]
 ) -> tuple[JointLevels, dict[str, Any]]:
-    """Return the levels of the joint, and where they come from."""
+    """Return the levels of the joint, and their source."""
     lines = np.unique(np.concatenate([one.freq_hz for one in modes]))
     file = read_assembly_file(model)
     parts = file.parts(lines)

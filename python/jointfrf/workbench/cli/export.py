@@ -132,7 +132,7 @@ def _without_negative(joint: Joint) -> tuple[Joint, list[str]]:
 
 
 def _springs(joint: Joint | LawJoint, freq_hz: float | None) -> Joint | None:
-    """Return the springs and dampers of a joint; None where it has none.
+    """Return the springs and dampers of a joint, or None if it has none.
 
     Raises
     ------

@@ -99,7 +99,7 @@ _TURNS = re.compile(r"m?theta|phi|rot")
 
 
 def lines_of(args: LineArguments) -> FloatArray | None:
-    """Return evenly spaced lines of the options, Hz; None where there is no step."""
+    """Return evenly spaced lines of the options, Hz, or None without a step."""
     if args.step is None:
         return None
     if args.band is None:

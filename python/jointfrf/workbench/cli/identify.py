@@ -166,7 +166,7 @@ def _warn_of_far_points(frfs: FrfSet, joint: MeasuredJoint) -> None:
 
 
 def _heading(args: IdentifyArguments, frfs: FrfSet, joint: MeasuredJoint) -> Iterator[str]:
-    """Say what is identified from what."""
+    """Yield lines on the joint to be identified, and its data."""
     points = " and ".join(
         shown_nodes(side) if joint.channels is not None else ", ".join(map(str, side)) for side in joint.nodes
     )
@@ -178,7 +178,7 @@ def _heading(args: IdentifyArguments, frfs: FrfSet, joint: MeasuredJoint) -> Ite
 
 
 def _differences(args: IdentifyArguments, joint: MeasuredJoint) -> Iterator[str]:
-    """Say what the central differences do to a rotational joint stiffness, before the result is read."""
+    """Yield lines on the effect of the central differences on a rotational joint stiffness."""
     rotations = [i for i, dof in enumerate(joint.dofs) if is_rotation(dof)]
     if not rotations:
         return
@@ -193,7 +193,7 @@ def _differences(args: IdentifyArguments, joint: MeasuredJoint) -> Iterator[str]
 
 
 def _sides(args: IdentifyArguments, frfs: FrfSet, joint: MeasuredJoint) -> list[SidePart]:
-    """Read the models of both sides; none where none are named."""
+    """Return the models of both sides, if they are named."""
     paths = [path for path in (args.side_j, args.side_k) if path is not None]
     if not paths:
         return []
@@ -240,7 +240,7 @@ def _fit(
 
 
 def _places(joint: MeasuredJoint) -> list[str]:
-    """Say where the reference points are."""
+    """Return lines with the places of the reference points."""
     one, other = joint.responses.references
     if np.array_equal(one, other):
         return [f"reference point x, y, z = {', '.join(f'{value:.6g}' for value in one + 0.0)} m"]

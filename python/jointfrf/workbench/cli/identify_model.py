@@ -156,7 +156,7 @@ def _read(args: IdentifyArguments) -> tuple[FrfSet, FrfSet]:
 
 
 def _rigid_faces(measured: MeasuredAssembly) -> tuple[list[int], list[int]] | None:
-    """Return the nodes that follow the reference points of the joint as rigid bodies; None where they do not on a side.
+    """Return the nodes that follow the reference points of the joint as rigid bodies, or None if they do not.
 
     Where a number is that of a node on both sides, the model of the assembly must have other numbers.
     """
@@ -166,7 +166,7 @@ def _rigid_faces(measured: MeasuredAssembly) -> tuple[list[int], list[int]] | No
 
 
 def _joint_places(measured: MeasuredAssembly) -> FloatArray | None:
-    """Return where the joint is on both sides, m; None where it is not known, or at several nodes of a side."""
+    """Return the place of the joint on both sides, m, or None if it is unknown, or at several nodes of a side."""
     found = []
     for part in measured.parts.values():
         nodes = {dof.rpartition(":")[0] for dof in part.keys.joint}
@@ -175,7 +175,7 @@ def _joint_places(measured: MeasuredAssembly) -> FloatArray | None:
 
 
 def _place_of_joint(measured: MeasuredAssembly, request: CardRequest) -> list[str]:
-    """Say where the nodes of the joint must be, unless that was given, and what they follow."""
+    """Return lines on the required places of the nodes of the joint, and the nodes that they follow."""
     spread = [f"{name}/{patch.name}" for name, part in measured.parts.items()
               if (patch := part.joint_patch) is not None and patch.coupling == "distributing"]  # fmt: skip
     said = [f"{' and '.join(spread)}: the joint acts on the mean motion of the nodes: connect its node to them by a "

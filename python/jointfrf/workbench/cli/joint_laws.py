@@ -23,7 +23,7 @@ _SPRINGS = {
 
 
 def joint_of_laws(args: IdentifyArguments, dofs: Sequence[str]) -> LawJoint | None:
-    """Return the joint of laws that the options name, with its DOFs in this order; None where they name none.
+    """Return the joint of laws in the options, with its DOFs in this order, or None if they name none.
 
     Raises
     ------

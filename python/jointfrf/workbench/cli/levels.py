@@ -236,7 +236,7 @@ def _fit(args: LevelsArguments, test: _Test, drive: Drive) -> tuple[Fit, Drive]:
     if drive.held == "response" and drive.channel not in channels:
         hint = did_you_mean(drive.channel, channels)
         raise UsageError(
-            f"--held {drive.channel}: {test.path.name} has no such channel; use one of {', '.join(channels)}{hint}"
+            f"{test.path.name} has no channel {drive.channel} to control; use one of {', '.join(channels)}{hint}"
         )
     with waiting(f"fit of {test.path.name}"):
         noise = stated_noise(args)

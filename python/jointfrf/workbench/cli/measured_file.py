@@ -22,7 +22,7 @@ __all__ = ["in_some_band", "noise_of", "setups_with_gains", "stated_noise", "wit
 
 
 def stated_noise(args: NoiseArguments) -> StatedNoise | float | None:
-    """Return the noise that the options of a fit state; None where they state none.
+    """Return the noise in the options of a fit, or None if they state none.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def setups_with_gains(args: GainArguments, source: str, setups: SetUps | None, s
 def in_some_band(
     freq_hz: FloatArray, h: ComplexArray, bands: list[tuple[float, float]] | None
 ) -> tuple[FloatArray, ComplexArray]:
-    """Return the lines in the bands; all where there are none."""
+    """Return the lines in the bands, or all lines without bands."""
     kept = in_bands(freq_hz, bands) if bands else np.ones(freq_hz.size, bool)
     return freq_hz[kept], np.ascontiguousarray(h[kept])
 

@@ -53,14 +53,14 @@ class MeasuredJoint:
     responses, forces : Interface
         From the channels to the joint DOFs.
     channels : JointChannels or None
-        Virtual points, where there are any.
+        Virtual points, if there are any.
     nodes : tuple of two lists of int
         On sides j and k.
     bands : list of (low, high), or None
         Hz; findings on channels are of these lines.
     every : (JointChannels, ndarray) or None
         The virtual points with the channels, too, that are left out because FRFs of them are missing, and the FRFs
-        between all of them, NaN where there is none.
+        between all of them, NaN if there is none.
     is_of_points : bool
         Whether the channels are the DOFs of several joint points.
     """

@@ -94,7 +94,7 @@ def _progress_text(now: float, *, bar: bool) -> str:
 
 
 def _show_progress(ended: threading.Event) -> None:
-    """Show the stage under way: on a terminal all the time, elsewhere a line now and then."""
+    """Show the current stage: always on a terminal, otherwise by a line at intervals."""
     shown = time.monotonic() + FIRST_LINE - _NEXT_LINE
     is_terminal = sys.stderr.isatty()
     while not ended.wait(_SETTLED):

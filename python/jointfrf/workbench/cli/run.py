@@ -106,7 +106,7 @@ class _Begun:
         self.count(done, total)
 
     def read(self) -> Iterator[str]:
-        """Give the text of the case, until it ends."""
+        """Yield the text of the case until it ends."""
         while (text := self.said.get()) is not None:
             yield text
 
@@ -132,7 +132,7 @@ def _run_one(folder: Path, options: RunArguments, workers: Workers, say: Callabl
 
 
 def _shown(case: Case, tables: list[Table]) -> Iterator[str]:
-    """Give the summary and the tables of a case."""
+    """Yield the summary and the tables of a case."""
     heading = f"{case.name}: {case.title}"
     yield f"{heading}\n{'=' * len(heading)}\n"
     for table in tables:

@@ -21,7 +21,7 @@ def _triplets(path: Path, limit: ReadLimit, columns: int, delimiter: str | None 
     Raises
     ------
     ValueError
-        A line holds something else, or numbers of rows are no whole numbers.
+        A line contains something else, or numbers of rows are no whole numbers.
     """
     limit.take(8 * columns * (path.stat().st_size // _LEAST_LINE + 1) // 2)
     found = np.loadtxt(path, comments="*", delimiter=delimiter, ndmin=2, encoding="latin-1")

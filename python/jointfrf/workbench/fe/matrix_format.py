@@ -1,4 +1,4 @@
-"""What a format of files of matrices consists of, and what is read of such a file."""
+"""Declaration of a format of files of matrices, and the matrix of such a file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Symmetry = Literal["stated", "possible", "no"]
 ENTRY, ROW = 48, 32
 #: Numbers of DOFs are smaller: six of a node, temperatures and the like behind them.
 _NUMBERS = 1000
-#: How the names of matrices begin in files that hold several; K4 is the structural damping of Nastran.
+#: First letters of the names of matrices in files with several; K4 is the structural damping of Nastran.
 _BEGINS: Mapping[str, tuple[str, ...]] = {
     "stiffness": ("K",), "mass": ("M",), "damping": ("B", "C"), "structural_damping": ("K4", "H"),
 }  # fmt: skip
@@ -80,7 +80,7 @@ class MatrixFormat:
     dof_suffix : str
         Suffix of a second file that names the DOFs; empty if the file names them itself.
     needs : str
-        The package that reads it, an extra; empty where none is needed.
+        Name of the extra package that reads the format; empty if none is needed.
     """
 
     name: str

@@ -40,29 +40,30 @@ _RIGID_HZ = 1e-2
 _WHOLE, _REAL, _WORDS = 10, 13, {2: 1, 4: 1, 5: 2, 6: 2}
 #: Normal modes, complex modes by displacement.
 _NORMAL, _COMPLEX = 2, 3
-#: The driving point of a mode must not move less than this share of where it moves most.
+#: Least motion of the driving point of a mode, as a share of its largest motion.
 _SEEN = 1e-6
 
 
 @dataclass
 class ModesFile:
-    """Modes as a file has them.
+    """Modes of a file.
 
     Attributes
     ----------
     frequency, damping : ndarray, shape (m,)
-        Natural frequencies, Hz, and damping ratios; NaN where the file has no damping.
+        Natural frequencies, Hz, and damping ratios; NaN if the file has no damping.
     shapes : ndarray, shape (n, m)
-        Real or complex; the residue of a mode is shape shape^T / scale, or over modal mass and 2 i w_d.
+        Real or complex mode shapes; the residue of a mode is shape shape^T / scale, or over modal mass and 2 i w_d.
     modal_mass : ndarray, shape (m,), or None
-        Of normal modes.
+        Modal mass of normal modes.
     scale : ndarray, shape (m,), or None
         Modal A of complex modes.
     dofs : tuple of str
-        Empty where the file does not name them.
+        Names of the DOFs; empty if the file does not contain them.
     lower, upper : ndarray, shape (n, n), or None
+        Lower and upper residuals.
     notes : list of str
-        What cannot be used.
+        Descriptions of unusable content.
     has_nodes : bool
         Whether the file also contains places of nodes.
     """
@@ -91,14 +92,14 @@ class ModesFile:
 
 
 def read_modes(path: Path, limit_gb: float | None = None, units: ModelUnits | None = None) -> ModesFile:
-    """Read modes.
+    """Return the modes of a file.
 
     Parameters
     ----------
     path : Path
-        A Universal File with datasets 55 or 2414 of modes, or an NPZ file.
+        Path of a Universal File with datasets 55 or 2414 of modes, or of an NPZ file.
     limit_gb : float, optional
-        As for `jointfrf.io.read_frfs`.
+        Limit of memory in GB, see `jointfrf.io.read_frfs`.
     units : ModelUnits, optional
         Units of a Universal File without dataset 164.
 
@@ -190,14 +191,14 @@ def _in_global_axes(
 
 
 def _dataset_55(records: list[str]) -> dict[str, Any] | None:
-    """Return one mode; None where the dataset holds something else."""
+    """Return one mode, or None if the dataset contains something else."""
     _, kind, _, _, data, values = _integers(records[5])[:6]
     words = _numbers(records[7])
     return _mode(kind, words[:4], words[:4]) | {"shape": _shape(records[8:], data, values)} if _is_mode(kind) else None
 
 
 def _dataset_2414(records: list[str]) -> dict[str, Any] | None:
-    """Return one mode; None where the dataset holds something else, or not at nodes."""
+    """Return one mode, or None if the dataset contains something else, or no values at nodes."""
     _, kind, _, _, data, values = _integers(records[8])[:6]
     if not _is_mode(kind) or _integers(records[2])[0] != 1:
         return None
@@ -210,7 +211,7 @@ def _is_mode(kind: int) -> bool:
 
 
 def _mode(kind: int, normal: list[float], complex_one: list[float]) -> dict[str, Any]:
-    """Return what a dataset says of a mode beside its shape.
+    """Return the fields of a mode of a dataset, without its shape.
 
     Parameters
     ----------
@@ -342,7 +343,7 @@ def _factors(path: Path, residues: ComplexArray, reference: NDArray[Any] | None)
 def _residual(
     path: Path, found: ModesFile, name: str, given: NDArray[Any] | None, reference: int | None
 ) -> FloatArray | None:
-    """Return a matrix of residuals; those of one column stand in its row as well, and others are noted as missing."""
+    """Return a matrix of residuals; a single column also fills its row, and missing residuals are noted."""
     if given is None:
         return None
     n = len(found.shapes)

@@ -296,19 +296,22 @@ _POINT = re.compile(r"\d+\.\d\d?\s*", re.ASCII)
 
 
 def read_dof_names(path: Path) -> tuple[str, ...]:
-    r"""Read the names of DOFs, in the order of the rows.
+    r"""Return the names of DOFs of a file, in the order of the rows.
 
     Parameters
     ----------
     path : Path
-        A text file with lines such as ``12:y``, or node and DOF, ``12 y`` or ``12 2`` (1 to 6: x, y, z, theta_x,
-        theta_y, theta_z), or ``12.2`` as CalculiX writes it (``.dof``); blank lines and what follows a ``#`` are
-        skipped. Or the ``.mapping`` of Ansys (row, node, ``UX``); or a file of Nastran with ``EXTRN`` cards.
+        Path of a file in one of these formats:
+
+        - a text file with lines ``12:y``, ``12 y``, ``12 2`` (1 to 6 are x, y, z, theta_x, theta_y, theta_z), or
+          ``12.2`` as in the ``.dof`` file of CalculiX; blank lines and comments after ``#`` are skipped;
+        - the ``.mapping`` file of Ansys (row, node, ``UX``);
+        - a file of Nastran with ``EXTRN`` cards.
 
     Returns
     -------
     tuple of str
-        ``"node:direction"``.
+        Names ``"node:direction"``.
 
     Raises
     ------

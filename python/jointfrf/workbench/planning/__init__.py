@@ -1,8 +1,8 @@
-"""Before a test: what sensors and hits will know of a joint, which to choose, and how many assemblies to test.
+"""Plans of tests: information of sensors and impacts on a joint, their choice, and the number of assemblies.
 
 information   Fisher information of FRFs that have not been measured, from models
-design        sensors and hits by greedy choice and exchange
-plan          `plan`: the door
+design        choice of sensors and impacts: greedy, then by exchange
+plan          `plan`: the public function
 joint_frfs    `plan_joint_frfs`: FRFs between all joint DOFs, without models
-assemblies    how many assemblies an interval of the next one needs
+assemblies    number of assemblies for a wanted prediction interval
 """

@@ -1,4 +1,4 @@
-"""How many assemblies a wanted interval of the next one needs."""
+"""Number of assemblies for a wanted prediction interval of the next assembly."""
 
 from __future__ import annotations
 
@@ -10,35 +10,42 @@ from jointfrf.kernel.arguments import as_count, as_not_negative, as_positive, as
 
 __all__ = ["assemblies_needed", "expected_half_width"]
 
-#: More assemblies of one joint than anybody builds for a test.
+#: Largest number of assemblies that is tried.
 _MOST = 100_000
 
 
 def expected_half_width(number: int, spread: float, error: float, probability: float = 0.95) -> float:
-    """Return the half width to be expected of the interval of the next assembly, relative to its middle.
+    """Return the expected half width of the prediction interval of the next assembly, relative to its middle.
 
     Parameters
     ----------
     number : int
-        Assemblies that are tested, at least 2.
-    spread, error : float
-        Relative standard deviations: of the assemblies, and of one fit.
+        Number of tested assemblies, at least 2.
+    spread : float
+        Relative standard deviation of the parameter between assemblies.
+    error : float
+        Relative standard error of one fit.
     probability : float
-        Of the interval.
+        Coverage probability of the interval, default 0.95.
 
     Raises
     ------
     ValueError
         Fewer than two assemblies; a spread or an error below zero; a probability outside 0 to 1.
 
+    See Also
+    --------
+    assemblies_needed : number of assemblies for a wanted half width.
+    pool : prediction intervals from fits.
+
     Notes
     -----
-    On a logarithmic scale half of draws have less than
+    On a logarithmic scale the median of the half widths is
 
         t_{n-1} sqrt( (s^2 + e^2)(1 + 1/n) m - e^2 ),   m = median of chi^2_{n-1} / (n - 1)
 
-    with the spread s and the error e of a fit, which is known and no part of the next assembly. Near a spread of zero
-    intervals of `pool` are wider.
+    with the spread s and the known error e of a fit, which is no part of the next assembly. If the spread is near
+    zero, intervals of `pool` are wider.
 
     Examples
     --------
@@ -55,24 +62,33 @@ def expected_half_width(number: int, spread: float, error: float, probability: f
 
 
 def assemblies_needed(half_width: float, spread: float, error: float, probability: float = 0.95) -> int | None:
-    """Return how many assemblies give an interval of the next one that is as narrow as wanted.
+    """Return the least number of assemblies whose prediction interval is as narrow as wanted.
 
     Parameters
     ----------
     half_width : float
-        Wanted, relative to the middle.
-    spread, error, probability : float
-        As in `expected_half_width`.
+        Wanted half width of the interval, relative to its middle.
+    spread : float
+        Relative standard deviation of the parameter between assemblies.
+    error : float
+        Relative standard error of one fit.
+    probability : float
+        Coverage probability of the interval, default 0.95.
 
     Returns
     -------
     int or None
-        None where none do: the assemblies themselves differ by more.
+        Number of assemblies; None if the spread alone makes the interval wider.
 
     Raises
     ------
     ValueError
-        As `expected_half_width`; a half width that is not positive.
+        A spread or an error below zero; a probability outside 0 to 1, or a half width that is not positive.
+
+    See Also
+    --------
+    expected_half_width : half width for a number of assemblies.
+    pool : prediction intervals from fits.
 
     Examples
     --------
@@ -83,7 +99,7 @@ def assemblies_needed(half_width: float, spread: float, error: float, probabilit
     True
     """
     wanted = as_positive("half_width", half_width)
-    expected_half_width(2, spread, error, probability)  # checks what is said of the fits
+    expected_half_width(2, spread, error, probability)  # checks the arguments
     if math.expm1(float(norm.ppf((1 + probability) / 2)) * spread) >= wanted:
         return None
     low, high = 1, 2

@@ -1,4 +1,4 @@
-"""Which sensors and hits to choose: greedily by what each adds for its price, then by exchange."""
+"""Choice of sensors and impacts: greedy by information for the price, then by exchange."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["Criterion", "Design", "Designer", "Prices", "best_first", "criterion_of", "loss_of"]
 
-#: What is made small: the mean variance of relative errors ("A"), the volume of their ellipsoid ("D"), one variance.
+#: Criterion that the choice minimises: mean variance of relative errors ("A"), or volume of their ellipsoid ("D").
 Criterion = Literal["A", "D"]
 
-#: Designs are equally good if the logarithms of their criteria differ by less, errors by 5e-6: far above rounding,
-#: which differs between processors, and far below any difference that matters. Reciprocity makes such pairs.
+#: Difference in the logarithm of the criterion below which designs are equally good (errors differ by 5e-6). Rounding,
+#: which differs between processors, is far smaller; differences that matter are far larger. Reciprocity causes ties.
 _TIE = 1e-5
-#: Exchanges that end nowhere: each lowers the criterion, so that this many are never needed.
+#: Largest number of exchanges; each lowers the criterion, so that the limit is never reached.
 _EXCHANGES = 200
 
 
 class Prices(NamedTuple):
-    """What a sensor and a hit cost, in the same unit."""
+    """Prices of a sensor and of an impact, in the same unit."""
 
     sensor: float
     hit: float
@@ -32,7 +32,7 @@ class Prices(NamedTuple):
 
 @dataclass(frozen=True)
 class Design:
-    """Chosen sensors and hits, by their numbers among the candidates; every sensor is read at every hit."""
+    """Chosen sensors and impacts, by their numbers among the candidates; every sensor is read at every impact."""
 
     sensors: tuple[int, ...]
     hits: tuple[int, ...]
@@ -60,7 +60,7 @@ def loss_of(covariance: FloatArray, kind: Criterion) -> FloatArray:
 
 
 def best_first(designs: Iterable[Design], loss: Callable[[Design], float]) -> Iterator[Design]:
-    """Yield designs by rising loss; of those as good as the best that is left, the first in the given order."""
+    """Yield designs by rising loss, and equally good designs in the given order."""
     rest = [(loss(one), one) for one in designs]
     while rest:
         least = min(size for size, _ in rest)
@@ -74,18 +74,20 @@ def _loss(design: Design) -> float:
 
 @dataclass(frozen=True)
 class Designer:
-    """Candidates and what they cost.
+    """Choose sensors and impacts from candidates.
 
     Attributes
     ----------
     of_frf : ndarray, shape (n_o, n_i, p, p)
         Information of each FRF.
     prior : ndarray, shape (p, p)
+        Information of the priors.
     loss : function
-        Of information, shape (..., p, p): smaller is better.
+        Criterion as a function of information, shape (..., p, p); smaller is better.
     prices : Prices
+        Prices of a sensor and of an impact.
     kept : Design
-        What is measured already, or stays in any case.
+        Sensors and impacts that are part of every design.
     """
 
     of_frf: FloatArray
@@ -95,7 +97,7 @@ class Designer:
     kept: Design
 
     def cost(self, design: Design) -> float:
-        """Return what a design costs beside what is kept."""
+        """Return the cost of a design without the kept sensors and impacts."""
         sensors = len(design.sensors) - len(self.kept.sensors)
         return sensors * self.prices.sensor + (len(design.hits) - len(self.kept.hits)) * self.prices.hit
 
@@ -105,7 +107,7 @@ class Designer:
         return found
 
     def designs(self) -> Iterator[Design]:
-        """Yield better and better designs, each with one sensor or hit more than the one before."""
+        """Yield designs of rising size, each with one sensor or impact more than the previous design."""
         design = self._first()
         while True:
             design = self._exchanged(design)
@@ -116,7 +118,7 @@ class Designer:
             design = grown[0]
 
     def ranked(self, design: Design, grown: Iterable[Design]) -> list[Design]:
-        """Return designs with one more channel than another design, the most useful for its price first."""
+        """Return designs with one more channel than another design, by falling gain for the price."""
 
         def change(more: Design) -> float:
             price = self.prices.sensor if len(more.sensors) > len(design.sensors) else self.prices.hit
@@ -125,7 +127,7 @@ class Designer:
         return list(best_first(grown, change))
 
     def _first(self) -> Design:
-        """Return what is kept, with the best sensor and the best hit where there is none."""
+        """Return the kept design, with the best sensor and impact added if it has none."""
         sensors = [self.kept.sensors] if self.kept.sensors else [(o,) for o in range(self.of_frf.shape[0])]
         hits = [self.kept.hits] if self.kept.hits else [(i,) for i in range(self.of_frf.shape[1])]
         pairs = [(own, other) for own in sensors for other in hits]
@@ -158,7 +160,7 @@ class Designer:
         return found
 
     def _exchanged(self, design: Design) -> Design:
-        """Return a design of the same size that no exchange of one sensor or one hit makes better."""
+        """Return a design of the same size that no exchange of one sensor or one impact improves."""
         for _ in range(_EXCHANGES):
             better = next(best_first(self._swaps(design), _loss), design)
             if not better.loss < design.loss - _TIE:

@@ -1,4 +1,4 @@
-"""Fisher information of FRFs that have not been measured, from models of the parts and an expected joint."""
+"""Fisher information of FRFs before the test, from models of the parts and an expected joint."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ __all__ = ["ErrorInformation", "FrfInformation", "PlannedTest", "expected_noise"
 
 #: Bytes of derivatives that are in memory at once.
 _BYTES = 256 * 2**20
-#: What is believed of every parameter in the widest sense, relative to its value: a factor of a thousand. It keeps the
-#: information of a single FRF, which may not distinguish all parameters, invertible.
+#: Relative standard deviation of the widest prior. It keeps the information of a single FRF, which may not determine
+#: all parameters, invertible.
 _WIDEST = 1e3
-#: FRFs below this part of the largest are zero by symmetry, but for rounding: they say nothing.
+#: FRFs below this share of the largest FRF are rounding: they are zero by symmetry and carry no information.
 _ROUNDING = 1e-10
-#: Share of what is known that a band must hold to be all that is worth measuring.
+#: Share of the information that the band to be measured contains.
 _BAND = 0.9
 
 
 def expected_noise(noise: float | StatedNoise, floor: float, averages: float) -> StatedNoise:
-    """Return the noise of the mean of averages; raises ValueError for numbers that no noise has, as in `plan`."""
+    """Return the noise of the mean of averages, or raise ValueError if the numbers are no noise."""
     constant, count = as_not_negative("floor", floor), as_positive("averages", averages)
     if isinstance(noise, StatedNoise):
         if constant:
@@ -44,9 +44,9 @@ def expected_noise(noise: float | StatedNoise, floor: float, averages: float) ->
 
 
 def narrowest_band(freq_hz: FloatArray, share: FloatArray) -> Band:
-    """Return the narrowest band that holds most of what all lines know."""
+    """Return the narrowest band that contains 90 % of the information of all lines."""
     known = np.concatenate([[0.0], np.cumsum(share)])
-    wanted = _BAND * known[-1] * (1 - 1e-12)  # the whole band holds what is wanted of it
+    wanted = _BAND * known[-1] * (1 - 1e-12)  # rounding must not make the whole band too small
     ends = np.searchsorted(known, known[:-1] + wanted)
     starts = np.flatnonzero(ends < len(known))
     at = starts[np.argmin(freq_hz[ends[starts] - 1] - freq_hz[starts])]
@@ -60,15 +60,15 @@ class FrfInformation:
     Attributes
     ----------
     parameters : tuple of FitParameter
-        All that is unknown, the joint's first.
+        Unknown parameters, those in the joint first.
     of_frf : ndarray, shape (n_o, n_i, p, p)
-        Of each FRF over all lines.
+        Information of each FRF over all lines.
     of_line : ndarray, shape (n_freq, p, p)
-        Of all FRFs on each line.
+        Information of all FRFs on each line.
     prior : ndarray, shape (p, p)
-        What is believed without a test.
+        Information of the priors.
     pull : ndarray, shape (n_o, n_i, p), or None
-        What a difference of FRFs between two assemblies moves, before it is divided by the information.
+        Score of the difference of FRFs between the measured and the modelled assembly.
     """
 
     parameters: tuple[FitParameter, ...]
@@ -79,19 +79,19 @@ class FrfInformation:
 
     @cached_property
     def scale(self) -> FloatArray:
-        """Values of the parameters: information is that of changes relative to them."""
+        """Values of the parameters, the unit of the relative changes."""
         return _scale(self.parameters)
 
     def covariance(self) -> FloatArray:
-        """Return the covariance of relative errors where all these FRFs are measured."""
+        """Return the covariance of relative errors if all FRFs are measured."""
         found: FloatArray = np.linalg.inv(self.prior + self.of_frf.sum(axis=(0, 1)))
         return found
 
     def shares(self, each: FloatArray) -> FloatArray:
-        """Return which share of what is known of each parameter comes from each part, shape (..., p).
+        """Return the share of the information on each parameter that each part contributes, shape (..., p).
 
-        With V the covariance, (V J V)_ii / V_ii of the information J of a part: shares of all parts and of the prior
-        add up to 1, and 1 % more of J lowers the variance by a hundredth of its share.
+        With the covariance V and the information J of a part, the share is (V J V)_ii / V_ii. Shares of all parts and
+        of the prior add up to 1. An increase of J by 1 % lowers the variance by a hundredth of the share.
         """
         covariance = self.covariance()
         found: FloatArray = np.einsum("ia,...ab,bi->...i", covariance, each, covariance) / np.diagonal(covariance)
@@ -111,8 +111,9 @@ class ErrorInformation:
     of_frf : ndarray, shape (n_o, n_i, p + e, p + e)
         Information of each FRF over all lines, error terms in units of their deviations at a level of 1.
     prior : ndarray, shape (p, p)
+        Information of the priors.
     groups : list of ErrorGroup
-        All errors in their order.
+        Errors of the models and of the gain, in the order of the error terms.
     """
 
     of_frf: FloatArray
@@ -120,23 +121,25 @@ class ErrorInformation:
     groups: list[ErrorGroup]
 
     def covariance(self, responses: Sequence[int], forces: Sequence[int]) -> FloatArray:
-        """Return the covariance of relative errors, as a fit of these FRFs will state it."""
+        """Return the covariance of relative errors that a fit of these FRFs is expected to state."""
         own = self.of_frf[np.ix_(responses, forces)].sum(axis=(0, 1))
         return expected_covariance(own, self.prior, self.groups)
 
 
 @dataclass(frozen=True)
 class PlannedTest:
-    """An assembly as it is expected, and the noise of a test on it.
+    """Store the expected assembly, and lines and noise of a test.
 
     Attributes
     ----------
     assembly : Assembly
+        Expected assembly.
     freq_hz : ndarray, shape (n_freq,)
         Lines above 0 Hz.
     noise : StatedNoise
+        Noise of the mean of averages.
     fixed : tuple of str
-        Parameters of the joint that are known.
+        Names of known parameters of the joint.
     """
 
     assembly: Assembly
@@ -150,8 +153,9 @@ class PlannedTest:
         Parameters
         ----------
         channels : Channels
+            Responses and forces of the FRFs.
         measured : Assembly, optional
-            What will be measured in fact, such as the assembly with the masses of the sensors: what that moves.
+            Assembly that the test measures, such as one with the masses of the sensors; default `assembly`.
 
         Raises
         ------
@@ -173,7 +177,7 @@ class PlannedTest:
 
     @property
     def has_errors(self) -> bool:
-        """Whether a fit allows for errors that no unknown describes: of models, or of a gain of all FRFs."""
+        """Whether a fit allows for errors without a parameter: errors of models, or of a gain of all FRFs."""
         return any(part.is_uncertain for part in self.assembly.parts.values())
 
     def error_information(self, channels: Channels) -> ErrorInformation:
@@ -188,7 +192,7 @@ class PlannedTest:
         return ErrorInformation(real @ real.swapaxes(2, 3), self._prior(vector), groups)
 
     def _weight(self, freq_hz: FloatArray, y: ComplexArray) -> FloatArray:
-        """Return one over the standard deviation of real and imaginary part of FRFs, 0 of those that are zero."""
+        """Return 1 over the standard deviation of real and imaginary part of each FRF, or 0 if the FRF is zero."""
         deviation = np.sqrt(self.noise.variance(freq_hz, y) / 2)
         shown = abs(y).max(axis=0) > _ROUNDING * abs(y).max()
         found: FloatArray = 1 / np.where(shown & (deviation > 0), deviation, np.inf)
@@ -203,10 +207,10 @@ class PlannedTest:
         return found + np.eye(len(scale)) / _WIDEST**2
 
     def vector(self, channels: Channels) -> ParameterVector:
-        """Return all parameters, with those of the channels."""
+        """Return all parameters, gains of the channels included."""
         prediction = Prediction(self.assembly, self.freq_hz[:1], channels.responses[:1], channels.forces[:1])
         found = parameter_vector(self.assembly, channels.gains(), self.fixed, prediction.joint_stiffness())
-        # Joints whose spread is to be found are each for itself before that.
+        # If the spread of joints is unknown, each joint has its own parameters.
         known = tuple(one for one in found.means if one.relative is not None)
         unknown = {one.mean for one in found.means} - {one.mean for one in known}
         values = found.with_means(found.values)

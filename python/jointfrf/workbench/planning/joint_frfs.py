@@ -1,4 +1,4 @@
-"""What FRFs between all DOFs of a joint will know of it, without models of the sides."""
+"""Expected standard errors of a joint from FRFs between all its DOFs, without models of the sides."""
 
 from __future__ import annotations
 
@@ -26,23 +26,23 @@ __all__ = ["JointFrfPlan", "plan_joint_frfs"]
 
 @dataclass(frozen=True)
 class JointFrfPlan:
-    """What FRFs between all joint DOFs will know.
+    """Expected standard errors from FRFs between all joint DOFs; `print` shows them.
 
     Attributes
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Lines of the test, Hz.
     value, std_error : dict of str to float
         Expected stiffness and damping of each DOF, and their standard errors; N/m, N s/m (N m/rad, N m s/rad).
     line_share : ndarray, shape (n_parameters, n_freq)
-        Share of what is known of each parameter that comes from each line.
+        Share of the information on each parameter that each line contributes.
     frf_share : ndarray, shape (n_parameters, 2 n, 2 n)
-        The same of each FRF, joint DOFs j, then k: 1 % more averages of an FRF lower the variance by a hundredth of it.
+        Share of the information on each parameter that each FRF contributes, joint DOFs j, then k. Averages that
+        increase by 1 % lower the variance by a hundredth of the share.
     bands : dict of str to tuple of float
-        Of each parameter, the narrowest band with 90 % of what the lines know of it, Hz.
+        Narrowest band with 90 % of the information on each parameter, Hz.
     shifts : dict of str to dict of str to float
-        By how much FRFs that are wrong in a known way move each parameter, for each of the ways by its name; one that
-        has none is "".
+        Error of each parameter that each set of biased FRFs causes, by the name of the set ("" without a name).
     """
 
     freq_hz: FloatArray
@@ -55,14 +55,14 @@ class JointFrfPlan:
 
     @property
     def shift(self) -> dict[str, float]:
-        """What FRFs that are wrong in a way without a name move; empty where there are none."""
+        """Errors that the biased FRFs without a name cause; empty if there are none."""
         return self.shifts.get("", {})
 
     def __str__(self) -> str:
         return "\n".join(self._lines())
 
     def moved(self) -> dict[str, dict[str, float]]:
-        """Return the shifts by the headings of their columns."""
+        """Return the shifts by the headings of their columns in the table."""
         return {f"shift, {way}" if way else "shift": by for way, by in self.shifts.items()}
 
     def _lines(self) -> Iterator[str]:
@@ -89,38 +89,48 @@ def plan_joint_frfs(
     averages: float = 1.0,
     biased: ArrayLike | Mapping[str, ArrayLike] | None = None,
 ) -> JointFrfPlan:
-    """Say what FRFs between all DOFs of a joint will know of it by `identify`, which lines and FRFs matter.
+    """Return the standard errors that `identify` is expected to reach, and the information of lines and FRFs.
 
     Parameters
     ----------
     freq_hz : array_like, shape (n_freq,)
-        Lines that will be measured, above 0 Hz.
+        Lines of the test, Hz, above 0.
     gamma : array_like, shape (n_freq, 2 n, 2 n)
-        FRFs of the assembly as they are expected, joint DOFs j, then k, m/N: from models of the parts, `couple`.
+        Expected FRFs of the assembly, joint DOFs j, then k, m/N: from models of the parts by `couple`.
     joint : Joint
-        As it is expected, without cross terms.
+        Expected joint, without cross terms.
     noise : float or StatedNoise
-        As in `plan`.
-    floor, averages : float
-        As in `plan`.
+        Standard deviation of an average relative to the FRF, default 0.01; or relative part and floors.
+    floor : float
+        Standard deviation of an average of the accelerance that does not depend on the FRF, m/(s^2 N), default 0.
+    averages : float
+        Number of averages of each FRF, default 1.
     biased : array_like, shape of gamma, or mapping of str to array_like, optional
-        FRFs as the test will give them without noise: rotations by finite differences at a spacing, virtual points on
-        sides that bend, sensors with their masses. What that moves is `shift`; of several, by name, it is in `shifts`.
+        FRFs with the systematic errors of the test and without noise: rotations by finite differences at a spacing,
+        virtual points on flexible sides, sensors with masses. `shift` contains the effect of one set, `shifts` the
+        effects of several sets by name.
 
     Returns
     -------
     JointFrfPlan
+        Expected values and standard errors, and shares of lines and FRFs.
 
     Raises
     ------
     ValueError
-        Wrong shapes; a joint with cross terms; noise that is zero; an FRF that is zero.
+        Wrong shapes; a joint with cross terms; noise that is zero, or an FRF that is zero.
     SingularMatrixError
         The lines do not determine the parameters.
 
+    See Also
+    --------
+    identify : fit of the measured FRFs.
+    plan : choice of sensors and impacts with models of the parts.
+
     Notes
     -----
-    The Cramer-Rao bound with unknown dynamic stiffnesses of both sides on every line: what `identify` reaches.
+    The standard errors are the Cramer-Rao bound with unknown dynamic stiffnesses of both sides on every line, which
+    `identify` reaches.
 
     Examples
     --------
@@ -160,7 +170,7 @@ def plan_joint_frfs(
     names = {way: f"biased {one_line(way)}" if way else "biased" for way in ways}
     wrong = {way: as_square(names[way], own, freq.size) for way, own in ways.items()}
     rows = information_rows(freq, lines, variance, kinds)
-    size = 1 / np.sqrt(2 * np.einsum("lfp,lfp->p", rows.conj(), rows).real)  # stiffness and damping differ by much
+    size = 1 / np.sqrt(2 * np.einsum("lfp,lfp->p", rows.conj(), rows).real)  # scaling: columns differ by decades
     rows = rows * size
     of_line = 2 * np.einsum("lfp,lfq->lpq", rows.conj(), rows, optimize=True).real
     of_frf = 2 * np.einsum("lfp,lfq->fpq", rows.conj(), rows, optimize=True).real
@@ -184,7 +194,7 @@ def plan_joint_frfs(
 def _shift(
     freq_hz: FloatArray, biased: ComplexArray, variance: FloatArray, joint: Joint, expected: dict[str, float]
 ) -> dict[str, float]:
-    """Return what the fit of FRFs without noise that are wrong finds, less what is expected."""
+    """Return the parameters from a fit of biased FRFs without noise, less the expected values."""
     kinds = {Parameter.parse(name).kind for name in expected}
     damping: DampingTerms = "both" if kinds == {"k", "c", "h"} else "hysteretic" if "h" in kinds else "viscous"
     with warnings.catch_warnings():

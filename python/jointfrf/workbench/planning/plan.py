@@ -1,4 +1,4 @@
-"""What a test that has not been made will know of a joint, and which sensors and hits to choose for it."""
+"""Plan of a test: choice of sensors and impacts, and the standard errors to expect."""
 
 from __future__ import annotations
 
@@ -32,29 +32,30 @@ from jointfrf.workbench.planning.information import FrfInformation, PlannedTest,
 
 __all__ = ["Addition", "MeasurementPlan", "PlanStep", "plan"]
 
-#: Without a goal, a further sensor or hit is worth its price while it lowers the error by this share.
+#: Share by which a further sensor or impact must lower the error if neither `within` nor `budget` is given.
 _WORTH = 0.1
-#: A candidate is blind where it has less than this part of the information that candidates have on the average.
+#: Share of the mean information of candidates below which a candidate is blind.
 _BLIND = 0.01
-#: An error that leaves a parameter open.
+#: Relative error above which a parameter is not determined.
 _OPEN = 0.5
-#: Names of blind candidates that one sentence can hold.
+#: Largest number of blind candidates that a sentence names.
 _NAMED = 6
 
 
 @dataclass(frozen=True)
 class PlanStep:
-    """A test: sensors, each of them read at every hit.
+    """A test in which every sensor is read at every impact.
 
     Attributes
     ----------
     sensors, hits : tuple of str
-        DOFs.
+        DOFs of the sensors and of the impacts.
     cost : float
+        Price of sensors and impacts that are not given already.
     error : float
         Size of the relative errors of the targets, by the criterion.
     std_error : dict of str to float
-        Of all parameters.
+        Expected standard errors of all parameters.
     """
 
     sensors: tuple[str, ...]
@@ -66,16 +67,18 @@ class PlanStep:
 
 @dataclass(frozen=True)
 class Addition:
-    """A sensor or a hit more.
+    """A further sensor or impact.
 
     Attributes
     ----------
     kind : str
         ``"sensor"`` or ``"hit"``.
     dof : str
+        DOF of the sensor or impact.
     cost : float
+        Price of the sensor or impact.
     error : float
-        Size of the relative errors of the targets with it.
+        Size of the relative errors of the targets if it is added.
     """
 
     kind: str
@@ -86,32 +89,35 @@ class Addition:
 
 @dataclass(frozen=True)
 class MeasurementPlan(WithFindings):
-    """What was planned.
+    """A plan of a test; `print` shows it.
 
     Attributes
     ----------
     freq_hz : ndarray, shape (n_freq,)
+        Lines of the test, Hz.
     value, unit : dict of str
         Expected values of all parameters, and their units.
     targets : tuple of str
-        Parameters that the plan is for.
+        Names of the parameters that the plan is for.
     steps : tuple of PlanStep
-        From the smallest test to the one that is proposed: the last.
+        Tests of rising size; the last one is proposed.
     everything : PlanStep
-        All candidates.
+        Test with all candidates.
     additions : tuple of Addition
-        What would come next, the most useful for its price first.
+        Further sensors and impacts, by falling gain for the price.
     line_share : ndarray, shape (n_targets, n_freq)
-        Share of what the proposed test knows of each target that comes from each line; with that of priors 1 together.
+        Share of the information on each target that each line of the proposed test contributes. With the share of the
+        priors the sum is 1.
     frf_share : ndarray, shape (n_targets, n_responses, n_forces)
-        The same of each candidate, if all were measured.
+        Share of the information on each target that each candidate contributes if all are measured.
     responses, forces : tuple of str
-        Candidates.
+        DOFs of the candidates.
     bands : dict of str to tuple of float
-        Of each target, the narrowest band with 90 % of what the lines know of it, Hz.
+        Narrowest band with 90 % of the information on each target, Hz.
     shift : dict of str to float
-        By how much the masses of the sensors move each target, where they are not in the model.
+        Error of each target by the masses of the sensors; empty if no mass is given.
     findings : tuple of Finding
+        Warnings about the plan.
     """
 
     freq_hz: FloatArray
@@ -131,11 +137,11 @@ class MeasurementPlan(WithFindings):
 
     @property
     def proposed(self) -> PlanStep:
-        """The test that is proposed."""
+        """The proposed test."""
         return self.steps[-1]
 
     def relative_error(self, step: PlanStep, name: str) -> float:
-        """Return the standard error of a parameter over its value; of one that is 0, inf."""
+        """Return the standard error of a parameter over its value, or inf if the value is 0."""
         return step.std_error[name] / abs(self.value[name]) if self.value[name] else np.inf
 
     def __str__(self) -> str:
@@ -193,68 +199,82 @@ def plan(
     response_gains: Mapping[str, Unknown] | None = None,
     force_gains: Mapping[str, Unknown] | None = None,
 ) -> MeasurementPlan:
-    """Plan a test: which sensors and hits show a joint best, and what they will know of it.
+    """Choose sensors and impacts for a test, and return the standard errors to expect.
 
     Parameters
     ----------
     assembly : Assembly
-        With the joint as it is expected, and what is unknown of the models, as for `identify_model`.
+        Assembly with the expected joint and the unknowns of the models, as `identify_model` takes it.
     freq_hz : array_like, shape (n_freq,)
-        Lines that will be measured, above 0 Hz.
+        Lines of the test, Hz, above 0.
     responses, forces : sequence of str
-        Candidates: DOFs ``"A/7:y"`` where there could be a sensor, and a hit or a shaker.
+        DOFs ``"A/7:y"`` that are candidates for a sensor, and for an impact or a shaker.
     noise : float or StatedNoise
-        Standard deviation of an average relative to the FRF; or relative part and floors.
+        Standard deviation of an average relative to the FRF, default 0.01; or relative part and floors.
     floor : float
-        Standard deviation of an average of the accelerance that does not depend on the FRF, m/(s^2 N).
+        Standard deviation of an average of the accelerance that does not depend on the FRF, m/(s^2 N), default 0.
     averages : float
-        Averages of each FRF.
+        Number of averages of each FRF, default 1.
     targets : sequence of str, optional
-        Parameters that are to be found: those of joints by default. Unknowns of models, and means of joints that are
-        alike with a spread that is given, can be named.
+        Names of the parameters whose errors the plan lowers, default all free parameters of joints. Unknowns of models
+        are possible, and means of alike joints whose spread is given.
     criterion : {"A", "D"}
-        What the choice makes small: the mean of the squared relative errors of the targets, or the volume of their
-        ellipsoid. One target alone is c-optimality.
+        Criterion that the choice minimises: mean of the squared relative errors of the targets ("A", default), or
+        volume of their ellipsoid ("D"). With one target both are c-optimality.
     within : float, optional
         Relative error (by the criterion) at which the plan ends.
     budget : float, optional
-        What sensors and hits may cost together. By default the plan ends where one more lowers the error by less than
-        a tenth.
+        Largest total price of sensors and impacts. Without `within` and `budget` the plan ends when one more sensor or
+        impact lowers the error by less than a tenth.
     sensor_price, hit_price : float
-        Of one sensor, of one hit.
+        Price of one sensor, and of one impact, default 1.
     sensors, hits : sequence of str
-        What is there already, or stays in any case; at no cost.
+        DOFs of sensors and impacts that are part of every test, at no cost.
     sensor_mass : float
-        kg of each sensor, which the model does not have: what it moves is shown.
-    fixed, response_gains, force_gains
-        As in `identify_model`.
+        Mass of each sensor in kg, default 0, which the model does not contain; `shift` contains its effect.
+    fixed : sequence of str
+        Names of parameters of the joint that are known.
+    response_gains, force_gains : mapping of str to Unknown, optional
+        Unknown gains of channels, by DOF.
 
     Returns
     -------
     MeasurementPlan
+        Proposed test, smaller tests, and shares of lines and FRFs.
 
     Raises
     ------
     ValueError
-        Names that there are not; a joint with a parameter that is 0, of which no relative error can be said; nothing
-        to choose from; noise that is zero.
+        Unknown names; a target whose value is 0, which has no relative error; no candidates, or noise that is zero.
     SingularLineError
         An undamped assembly resonates at a line.
 
+    See Also
+    --------
+    identify_model : fit of the measured FRFs.
+    plan_joint_frfs : expected errors from FRFs between all joint DOFs.
+    write_plan : page of a plan.
+
     Notes
     -----
-    Fisher information of relative changes of all parameters, priors included: its inverse is the least covariance of an
-    unbiased estimate, which `identify_model` reaches. Errors of models that are not exact are in the errors that are
-    stated, at the level that `identify_model` is expected to allow for; the choice is made without them. Sensors and
-    hits are added one at a time, the one first that lowers the criterion most for its price; after each, sensors and
-    hits are exchanged one by one as long as that lowers it further (V. V. Fedorov, Theory of Optimal Experiments, 1972;
-    D. C. Kammer, J. Guid. Control Dyn. 14 (1991) 251, for sensors of modes). Designs whose errors differ by less than
-    5e-6 are taken in the order of the candidates. Every sensor is read at every hit. The
-    proposal is as good as the expected joint is: plan with a soft and a stiff one if it is not known.
+    The inverse of the Fisher information of relative changes, priors included, is the least covariance of an unbiased
+    estimate, which `identify_model` reaches. The stated errors include errors of models that are not exact, at the
+    level that `identify_model` is expected to allow for. The choice is made without them.
+
+    `plan` adds the sensor or impact that lowers the criterion most for its price. After each addition it exchanges
+    sensors and impacts one by one as long as the criterion falls [1]_ [2]_. Designs whose errors differ by less than
+    5e-6 are taken in the order of the candidates. Every sensor is read at every impact.
+
+    The proposal is only as good as the expected joint. If the joint is not known, plan with a soft and a stiff one.
+
+    References
+    ----------
+    .. [1] V. V. Fedorov, Theory of Optimal Experiments, 1972.
+    .. [2] D. C. Kammer, J. Guid. Control Dyn. 14 (1991) 251, for sensors of modes.
 
     Examples
     --------
-    Which of three masses to hit, and where to put sensors:
+    Choose one of three masses for the impact, and the position of the sensors:
 
     >>> import numpy as np, jointfrf as jf
     >>> a = jf.Substructure(jf.chain([5, 3], [2500, 3500], [3, 4], ground="start"), ["2:x"], exact=True)
@@ -321,7 +341,7 @@ def _targets(vector: ParameterVector, names: tuple[str, ...] | None) -> NDArray[
 
 
 class _Goal(NamedTuple):
-    """Where a plan ends."""
+    """Conditions at which a plan ends."""
 
     budget: float
     within: float
@@ -342,7 +362,7 @@ class _Goal(NamedTuple):
 
 
 class _Planner(NamedTuple):
-    """What a plan is made from."""
+    """Makes the plan from the candidates and their information."""
 
     test: PlannedTest
     channels: Channels
@@ -388,7 +408,7 @@ class _Planner(NamedTuple):
         return replace(found, findings=tuple(_findings(found)))
 
     def _step(self, design: Design) -> PlanStep:
-        """Return a design with the errors that a fit will state, those of the models with them."""
+        """Return a design with the expected standard errors, errors of the models included."""
         covariance = np.array(np.linalg.inv(self.designer.information(design)), np.float64)
         own = self._own_channels(design)
         if self.test.has_errors:
@@ -413,7 +433,7 @@ class _Planner(NamedTuple):
         return [names.index(one.name) for one in self.test.vector(channels).fitted]
 
     def _additions(self, best: Design, step: PlanStep) -> Iterator[Addition]:
-        """Yield what would come next, the most useful for its price first."""
+        """Yield further sensors and impacts, by falling gain for the price."""
         grown = list(self.designer.additions(best))
         if self.test.has_errors:
             grown = [replace(more, loss=2 * np.log(size)) for more, size in self._sizes_with_errors(best, grown)]
@@ -425,7 +445,7 @@ class _Planner(NamedTuple):
             yield Addition(kind, dof, cost, float(np.exp(more.loss / 2)))
 
     def _sizes_with_errors(self, best: Design, grown: Sequence[Design]) -> Iterator[tuple[Design, float]]:
-        """Yield larger designs with the size of their errors, those of the models with them."""
+        """Yield larger designs with the size of their errors, errors of the models included."""
         n_o, n_i = self.information.of_frf.shape[:2]
         sensors = [*best.sensors, *(o for o in range(n_o) if o not in best.sensors)]
         hits = [*best.hits, *(i for i in range(n_i) if i not in best.hits)]
@@ -454,7 +474,7 @@ class _Planner(NamedTuple):
         )  # fmt: skip
 
     def _chosen(self, design: Design, sensor_mass: float) -> FrfInformation:
-        """Return the information of a design by line, and what the masses of its sensors move."""
+        """Return the information of a design by line, and the effect of the masses of its sensors."""
         chosen, measured = self._own_channels(design), None
         if sensor_mass:
             masses = tuple(AddedMass(dofs, sensor_mass) for dofs in self._nodes(chosen.responses))
@@ -483,7 +503,7 @@ def _percent(value: float) -> str:
 
 
 def _findings(found: MeasurementPlan) -> Iterator[Finding]:
-    """Say what no choice cures, what sees nothing, and what sensors do to the structure."""
+    """Yield warnings of targets that no choice determines, of blind candidates and of heavy sensors."""
     for name in found.targets:
         least = found.relative_error(found.everything, name)
         if least > _OPEN:

@@ -1,4 +1,4 @@
-"""One parameter of a joint over several fits: mean, spreads, trends, the next assembly, and who does not belong."""
+"""One parameter of a joint over several fits: mean, spreads, trends, prediction interval, and outliers."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from jointfrf.workbench.pooling.random_effects import RandomEffects
 
 __all__ = ["Estimate", "FactorSpread", "FactorTrend", "PooledParameter", "TestPlan", "pooled_parameter", "shown_chance"]
 
-#: A parameter within this many standard errors of zero in some fit has no logarithm worth averaging.
+#: Distance from zero in standard errors, in any fit, below which a parameter is not pooled on a logarithmic scale.
 _FROM_ZERO = 2.0
 #: Half of a 95 % interval, in standard errors.
 _HALF = float(norm.ppf(0.975))
-#: Fits from which on one can be outlying: of three, any could be.
+#: Least number of fits for an outlier: with three, any fit could be the outlier.
 _LEAST_TO_JUDGE = 4
-#: Chance with which any fit of a set without outliers is named, and with which a factor is said to matter.
+#: Significance level of outliers over a set of fits, and of factors.
 _SIGNIFICANT = 0.05
-#: Chance of fits that agree so well, below which a part of their errors is taken as common to all.
+#: p-value of the agreement of the fits below which a share of their errors is taken as common to all.
 _AGREE = 0.01
-#: A spread below this share of what its interval reaches is zero: what a minimiser leaves of it.
+#: Share of the upper limit below which a spread is zero up to the tolerance of the minimiser.
 _NOTHING = 1e-3
-#: The factor whose groups are assemblies, and what its repeats differ by.
+#: Names of the factor whose groups are assemblies, and of the spread between repeats.
 ASSEMBLY, _REPEAT = "assembly", "repeat"
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value with its interval, in its unit; of a fit, the one of 95 %."""
+    """A value with its interval, in its unit; the interval of a fit is the 95 % interval."""
 
     value: float
     low: float
@@ -49,14 +49,14 @@ class FactorSpread:
     Attributes
     ----------
     factor : str
-        "assembly", "day", ...; "repeat" for what is left between fits of one assembly.
+        Name of the factor: "assembly", "day", ...; "repeat" for the scatter between fits of one assembly.
     levels : int
-        Groups that were seen.
+        Number of groups in the fits.
     value, low, high : float
         Standard deviation by restricted maximum likelihood (REML), with its interval: relative to the parameter on a
         logarithmic scale, else in its unit.
     p_value : float
-        Chance of differences at least so large where this factor makes none, whatever the others do.
+        p-value under the hypothesis that this factor has no spread, for any spreads of other factors.
     """
 
     factor: str
@@ -74,10 +74,11 @@ class FactorTrend:
     Attributes
     ----------
     factor : str
+        Name of the factor.
     value, low, high : float
         Exponent b of (number)^b on a logarithmic scale, else change of the parameter by unit of the number.
     p_value : float
-        Two-sided chance of a change at least so large where there is none.
+        Two-sided p-value under the hypothesis of no trend.
     """
 
     factor: str
@@ -94,24 +95,25 @@ class PooledParameter:
     Attributes
     ----------
     name, unit : str
+        Name and unit of the parameter.
     scale : {"log", "linear"}
-        Scale on which it scatters normally; on "log" the mean is the geometric one, and spreads are relative.
+        Scale on which the parameter scatters normally. On "log" the mean is geometric, and spreads are relative.
     mean : Estimate
-        With the interval of the mean of all such assemblies.
+        Mean of all such assemblies, with its confidence interval.
     next_one : Estimate
-        With the interval in which another assembly of the same kind lies, at the mean of each trend.
+        Prediction for another assembly of the same kind, with its interval, at the mean of each trend.
     spreads : tuple of FactorSpread
-        Of each factor; what no factor explains comes last.
+        Spread over each factor; the spread that no factor explains is last.
     trends : tuple of FactorTrend
+        Trend over each number.
     labels : tuple of str
         Labels of the fits that have this parameter.
     estimates : tuple of Estimate
-        Theirs.
+        Estimates of these fits.
     outlying : tuple of str
-        Labels of those that do not belong to the others.
+        Labels of outlying fits.
     at : dict of str to float
-        Number of each trend at which `mean` and `next_one` are stated: the mean of the fits, on "log" the geometric
-        mean.
+        Number of each trend to which `mean` and `next_one` belong: the mean over the fits, on "log" the geometric mean.
     """
 
     name: str
@@ -129,19 +131,20 @@ class PooledParameter:
 
 @dataclass(frozen=True)
 class TestPlan:
-    """What is known of the fits beside their estimates.
+    """Labels, factors and common errors of the fits.
 
     Attributes
     ----------
     labels : tuple of str
+        Names of the fits.
     groups : dict of str to ndarray of int
-        Random factors, finest first: the number of each fit's group.
+        Number of each fit's group, by random factor, finest first.
     trends : dict of str to ndarray
-        Numbers that act by themselves.
+        Number of each fit, by trend.
     common : list of (ndarray of int, float)
-        Relative standard errors that fits of the same group share.
+        Groups of the fits and relative standard error that fits of the same group share.
     probability : float
-        Of intervals.
+        Coverage probability of the intervals.
     """
 
     labels: tuple[str, ...]
@@ -154,7 +157,7 @@ class TestPlan:
 def pooled_parameter(
     name: str, unit: str, estimates: Sequence[Estimate | None], plan: TestPlan
 ) -> tuple[PooledParameter | None, list[Finding]]:
-    """Pool one parameter; None where fewer than two fits have it.
+    """Return the pooled parameter, or None if fewer than two fits have it.
 
     Raises
     ------
@@ -200,7 +203,7 @@ def _is_positive(one: Estimate) -> bool:
 def _random_effects(
     used: Sequence[Estimate], at: NDArray[np.intp], is_log: bool, plan: TestPlan
 ) -> tuple[list[str], RandomEffects]:
-    """Return the names of the random factors that can be seen, and the model with its first column for the mean."""
+    """Return the names of the random factors that can be estimated, and the model, whose first column is the mean."""
     limits = np.array([(one.value, one.low, one.high) for one in used])
     limits = np.log(limits) if is_log else limits
     values, error = limits[:, 0], (limits[:, 2] - limits[:, 1]) / (2 * _HALF)
@@ -223,14 +226,14 @@ def _random_effects(
     for name, codes in plan.groups.items():
         group = np.unique(codes[at], return_inverse=True)[1].astype(np.intp)
         trial = RandomEffects(values, covariance, design, [*factors, group])
-        if min(trial.degrees_of_freedom) > 0:  # among the fits used it is neither one group nor a group each
+        if min(trial.degrees_of_freedom) > 0:  # the fits used are more than one group, and fewer groups than fits
             names.append(name)
             factors.append(group)
     return names, RandomEffects(values, covariance, design, factors)
 
 
 def _centre(numbers: FloatArray, is_log: bool) -> float:
-    """Return the mean of the numbers of a trend, on a logarithmic scale the geometric one."""
+    """Return the mean of the numbers of a trend, on a logarithmic scale the geometric mean."""
     return float(np.exp(np.log(numbers).mean()) if is_log else numbers.mean())
 
 
@@ -240,7 +243,7 @@ def _mean_and_next(
     back = math.exp if is_log else float
     of_mean = np.eye(effects.design.shape[1])[0]
     mean = effects.combination(of_mean)
-    # Another assembly differs by all that differs between assemblies, not by what repeats of one differ by.
+    # The next assembly has the spreads between assemblies, not the spread between repeats.
     between = np.array([float(ASSEMBLY not in names), *(1.0 for _ in names)])
     ahead = effects.combination(of_mean, effects.variances @ between)
     middle = back(mean.quantile(0.5))
@@ -270,7 +273,7 @@ def _trends(effects: RandomEffects, names: Sequence[str], probability: float) ->
 
 
 def _outlying(effects: RandomEffects, names: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
-    """Name the assemblies that do not belong to the others, each judged by a distribution that it does not enter."""
+    """Return the outlying assemblies, each tested against the distribution of the remaining ones."""
     own = effects.factors[list(names).index(ASSEMBLY)] if ASSEMBLY in names else np.arange(len(labels))
     units = np.unique(own)
     if units.size < _LEAST_TO_JUDGE:
@@ -278,13 +281,13 @@ def _outlying(effects: RandomEffects, names: Sequence[str], labels: Sequence[str
     found = list[str]()
     for unit in units:
         members = np.flatnonzero(own == unit)
-        if effects.chance_of(members) * units.size < _SIGNIFICANT:  # Bonferroni: any of them could have been it
+        if effects.chance_of(members) * units.size < _SIGNIFICANT:  # Bonferroni
             found += [labels[i] for i in members.tolist()]
     return tuple(found)
 
 
 def shown_chance(p_value: float) -> str:
-    """Return a probability as it is printed."""
+    """Return a probability as text."""
     return f"{p_value:.2g}" if p_value >= 1e-4 else "< 1e-4"
 
 

@@ -1,4 +1,4 @@
-"""Fits of the same joint in several assemblies, at several torques, on several days: what the next one will be."""
+"""Pooled fits of the same joint in several assemblies, at several torques, on several days."""
 
 from __future__ import annotations
 
@@ -31,16 +31,18 @@ Factors = Mapping[str, Sequence[str | float]]
 
 @dataclass(frozen=True)
 class PooledFits(WithFindings):
-    """What several fits of one joint say together; `print` shows it.
+    """Pooled fits of one joint; `print` shows them.
 
     Attributes
     ----------
     labels : tuple of str
-        Of the fits.
+        Names of the fits.
     parameters : dict of str to PooledParameter
+        Pooled parameters by name.
     probability : float
-        Of the intervals of means, spreads, trends and the next assembly.
+        Coverage probability of the intervals of means, spreads, trends and the next assembly.
     findings : tuple of Finding
+        Warnings about fits and parameters.
     """
 
     labels: tuple[str, ...]
@@ -75,7 +77,7 @@ class PooledFits(WithFindings):
 
     @property
     def places(self) -> dict[str, list[str]]:
-        """Names of parameters by the numbers of the trends at which their means and next assemblies are stated."""
+        """Return names of parameters by the numbers of the trends to which mean and next assembly belong."""
         found = dict[str, list[str]]()
         for one in self.parameters.values():
             if one.at:
@@ -84,7 +86,7 @@ class PooledFits(WithFindings):
 
 
 def place_of(one: PooledParameter) -> str:
-    """Return the numbers of the trends at which mean and next assembly of a parameter are stated."""
+    """Return the numbers of the trends to which mean and next assembly of a parameter belong."""
     kind = " (geometric mean)" if one.scale == "log" else " (mean)"
     return ", ".join(f"{name} {number:.4g}{kind}" for name, number in one.at.items())
 
@@ -103,46 +105,58 @@ def pool(
     parameters: Sequence[str] | None = None,
     probability: float = 0.95,
 ) -> PooledFits:
-    """Pool fits of the same joint: mean, spread between assemblies, and the interval of the next assembly.
+    """Pool fits of the same joint, and return mean, spread between assemblies and prediction interval.
 
     Parameters
     ----------
     fits : sequence of Fit, at least 2
-        Of several assemblies, torques, days, specimens; also from files, by `load`.
+        Fits of several assemblies, torques, days or specimens; `load` reads them from files.
     labels : sequence of str, optional
-        Name of each fit; "1", "2", ... by default.
+        Names of the fits, default "1", "2", ...
     factors : mapping of str to sequence, optional
-        For each factor ("assembly", "torque", "day", "operator") the group of each fit. Fits of one "assembly" are
-        repeats: what they differ by is the spread "repeat". Without it each fit is an assembly of its own.
+        Group of each fit, by factor ("assembly", "torque", "day", "operator"). Fits of one "assembly" are repeats,
+        whose spread is "repeat". Without the factor "assembly" each fit is a separate assembly.
     trends : iterable of str
-        Factors whose numbers act by themselves, as a power law on a logarithmic scale: the torque.
+        Names of factors whose numbers act as a trend (on a logarithmic scale a power law), such as the torque; default
+        none.
     common : float or mapping of str to float
-        Relative standard error that all fits share, such as that of one calibration: it is not averaged away. By name
-        of a factor: an error that fits of the same group share.
+        Relative standard error that all fits share, such as the error of one calibration, default 0. It is not averaged
+        away. By name of a factor: an error that fits of the same group share.
     parameters : sequence of str, optional
-        Names, loss factors ``"eta_y"`` included; by default all of the joint.
+        Names of parameters, loss factors ``"eta_y"`` included, default all parameters of the joint.
     probability : float
-        Of the intervals.
+        Coverage probability of the intervals, default 0.95.
 
     Returns
     -------
     PooledFits
+        Mean, spreads, trends and prediction interval of each parameter.
 
     Raises
     ------
     ValueError
-        Fewer than two fits; a factor with another number of groups, with one only, or that cannot be distinguished from
-        another factor; too few fits for the trends; a name that no fit has; a common error below zero.
+        Fewer than two fits, or too few for the trends; a factor with a wrong number of groups, with one group only, or
+        equal to another factor. A name that no fit has, or a common error below zero.
     TypeError
-        Something in `fits` is no fit.
+        An element of `fits` is no fit.
+
+    See Also
+    --------
+    transfer : test of one joint in different structures.
+    assemblies_needed : number of assemblies for a wanted interval.
+    write_pool : page of pooled fits.
 
     Notes
     -----
-    Model: y = mean + trends + random effects of the factors + error, the variance of the error being that of each fit;
-    in logarithms where all fits are more than two standard errors above zero. Spreads are estimated by REML. Intervals
-    come from the confidence distribution of the variances (H. Iyer, C. Wang, T. Mathew, JASA 99 (2004) 1060): they hold
-    for three assemblies as for thirty, and are too wide rather than too narrow where the spread is small beside the
-    errors of the fits. Parameters are pooled one by one.
+    The model is y = mean + trends + random effects of the factors + error, with the error variance of each fit. It is a
+    model of logarithms if all fits are more than two standard errors above zero. Spreads are estimated by REML.
+    Intervals come from the confidence distribution of the variances [1]_. They are valid for three assemblies as for
+    thirty. If the spread is small compared with the errors of the fits, they are too wide rather than too narrow.
+    Parameters are pooled one by one.
+
+    References
+    ----------
+    .. [1] H. Iyer, C. Wang, T. Mathew, JASA 99 (2004) 1060.
 
     Examples
     --------
@@ -197,7 +211,7 @@ def _estimates(fit: Fit) -> dict[str, tuple[str, Estimate]]:
 
 
 def as_fits(what: str, fits: object) -> list[Fit]:
-    """Return fits, at least two, as a list; refuse what is none."""
+    """Return at least two fits as a list, or raise an error."""
     if not isinstance(fits, Iterable) or isinstance(fits, str):
         raise TypeError(f"fits is {one_line(fits)}; give a sequence of Fit")
     listed = list(fits)
@@ -209,7 +223,7 @@ def as_fits(what: str, fits: object) -> list[Fit]:
 
 
 def as_labels(labels: object, count: int) -> tuple[str, ...]:
-    """Return a different name for each fit; "1", "2", ... by default."""
+    """Return different names of the fits, default "1", "2", ..."""
     names = tuple(map(str, range(1, count + 1))) if labels is None else as_names("labels", labels)
     if len(set(names)) != count or len(names) != count:
         raise ValueError(f"wrong labels; give {count} different names, one for each fit")
@@ -223,7 +237,7 @@ def _plan(
     common: Mapping[str, float] | float,
     probability: float,
 ) -> TestPlan:
-    """Check what is said of the fits."""
+    """Check labels, factors and common errors of the fits."""
     count = len(labels)
     factors = {} if factors is None else factors
     check_type("factors", factors, Mapping)
@@ -267,7 +281,7 @@ def _numbers(name: str, own: Sequence[str | float]) -> FloatArray:
 
 
 def _random_factors(codes: Mapping[str, NDArray[np.intp]], count: int) -> dict[str, NDArray[np.intp]]:
-    """Return random factors, finest first; refuse those that cannot be distinguished from what else is there."""
+    """Return random factors, finest first, or raise ValueError if two of them are equal."""
     seen: dict[tuple[int, ...], str] = {}
     for name, own in codes.items():
         if own.max() + 1 == count and name != ASSEMBLY:

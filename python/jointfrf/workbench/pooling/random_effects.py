@@ -1,14 +1,16 @@
-"""A mean with variances between groups, from few values whose own errors are known.
+"""Random-effects model: mean and variances between groups from few values with known errors.
 
 y = X beta + sum over f of b_f[group] + e,   b_f ~ N(0, s_f^2),   e ~ N(0, s_0^2 + V),   V known.
 
-The variances come from pivots: with X_f the columns of X and of all factors coarser than f, the residual sum of squares
-in the metric of the covariance drops by a chi-squared number when the groups of f join X_f, whatever beta is. Solved
-for s_f^2, one factor after the other, finest first, quantiles of chi-squared become a confidence distribution of the
-variances; given them, means are normal. For equal errors that is the t distribution, for errors of their own that of
-Cochran's Q. Source: H. Iyer, C. Wang, T. Mathew, Models and confidence intervals for true values in interlaboratory
-trials, JASA 99 (2004) 1060; for the variance alone W. Viechtbauer, Statistics in Medicine 26 (2007) 37; for its upper
-limit A. L. Read, Presentation of search results: the CLs technique, J. Phys. G 28 (2002) 2693.
+The variances come from pivots. Let X_f be the columns of X and of all factors coarser than f. When the groups of f join
+X_f, the residual sum of squares in the metric of the covariance drops by a chi-squared number, for any beta. Solved for
+s_f^2, one factor after the other, finest first, quantiles of chi-squared become a confidence distribution of the
+variances. Given the variances, means are normal. With equal errors this is the t distribution, with different errors
+the distribution of Cochran's Q.
+
+Sources: H. Iyer, C. Wang, T. Mathew, Models and confidence intervals for true values in interlaboratory trials, JASA 99
+(2004) 1060; for the variance alone W. Viechtbauer, Statistics in Medicine 26 (2007) 37; for its upper limit A. L. Read,
+Presentation of search results: the CLs technique, J. Phys. G 28 (2002) 2693.
 """
 
 from __future__ import annotations
@@ -26,19 +28,17 @@ from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["Mixture", "RandomEffects"]
 
-#: Points of the confidence distribution of the variances: quantiles at 2.5 % are then at 2.5 +- 0.1 %; and where only
-#: a probability is asked.
+#: Points of the confidence distribution of the variances, for quantiles (2.5 % within 0.1 %) and for probabilities.
 _POINTS, _FEW_POINTS = 512, 128
-#: Halvings of a variance's interval: beyond 1e-12 of it.
+#: Bisections of the interval of a variance, to less than 1e-12 of it.
 _HALVINGS = 48
 #: Eigenvalues below this share of the largest are zero: rounding of n = 100 values.
 _RANK = 1e-9
-#: Restricted likelihoods whose -2 ln differ by less than this are equally high: far above rounding, far below what
-#: data decide.
+#: Difference of -2 ln of restricted likelihoods below which they are equal: far above rounding, far below significance.
 _EQUAL = 1e-6
-#: Share of the variance of errors that stays their own, so that equal values leave a covariance that has an inverse.
+#: Least share of the variance of errors that is independent, so that the covariance has an inverse.
 _LEAST_OWN = 1e-6
-#: Standard deviations within which quantiles of a mixture are sought: beyond the smallest probability asked, 1e-9.
+#: Search range of quantiles of a mixture, in standard deviations: it contains the smallest probability used, 1e-9.
 _REACH = 8.0
 
 
@@ -49,6 +49,7 @@ class Mixture:
     Attributes
     ----------
     mean, variance : ndarray, shape (n,)
+        Means and variances of the normal distributions.
     """
 
     mean: FloatArray
@@ -59,7 +60,7 @@ class Mixture:
         return float(norm.cdf((value - self.mean) / np.sqrt(self.variance)).mean())
 
     def quantile(self, probability: float) -> float:
-        """Return the value below which a share of the distribution lies."""
+        """Return the quantile of a probability."""
         reach = _REACH * np.sqrt(self.variance)
         low, high = float((self.mean - reach).min()), float((self.mean + reach).max())
         return float(brentq(lambda value: self.below(value) - probability, low, high, xtol=1e-12 * (high - low)))
@@ -71,19 +72,20 @@ class Mixture:
 
 @dataclass(frozen=True, eq=False)
 class RandomEffects:
-    """Values with known errors, and the factors over which their truths scatter.
+    """Values with known errors, and the factors over which their true values scatter.
 
     Attributes
     ----------
     values : ndarray, shape (n,)
+        Estimates.
     covariance : ndarray, shape (n, n)
-        Of their errors, positive definite.
+        Covariance of the errors, positive definite.
     design : ndarray, shape (n, p)
         Columns of full rank, the first of ones.
     factors : sequence of ndarray of int, shape (n,)
-        Number of the group of each value; finest first. The scatter of the values themselves is not among them.
+        Number of the group of each value, finest factor first, without the scatter of the values themselves.
     points : int
-        Of the confidence distribution.
+        Number of points of the confidence distribution.
     """
 
     values: FloatArray
@@ -100,7 +102,7 @@ class RandomEffects:
 
     @cached_property
     def degrees_of_freedom(self) -> tuple[int, ...]:
-        """Of each component, that of the values first: what its groups add to the columns of those coarser than it."""
+        """Degrees of freedom of each component, values first: columns that it adds to coarser components."""
         ranks = [self.design.shape[1]]
         columns = self.design
         for own in reversed(self._effects[1:]):
@@ -150,18 +152,18 @@ class RandomEffects:
         return total
 
     def combination(self, weights: FloatArray, more: FloatArray | float = 0.0) -> Mixture:
-        """Return the distribution of weights . beta, of what lies around it with another variance, shape (N,)."""
+        """Return the distribution of weights . beta plus an independent variable of variance `more`, shape (N,)."""
         inverse = np.linalg.inv(self._total)
         normal = np.linalg.inv(self.design.T @ inverse @ self.design)
         beta = (normal @ (inverse @ self.values @ self.design)[..., None])[..., 0]
         return Mixture(beta @ weights, weights @ normal @ weights + more)
 
     def upper_limit(self, component: int, chance: float) -> float:
-        """Return the value that the variance of a component exceeds with a chance, given that it is not negative.
+        """Return the value that the variance of a component exceeds with a probability, given that it is not negative.
 
-        Values that agree by chance better than their errors would otherwise bound the variance by zero. With Q(t) the
-        pivot at the variance t, the limit solves P(chi^2 <= Q(t)) = chance P(chi^2 <= Q(0)). The limit is never below
-        the quantile of `variances`.
+        If values agree by chance better than their errors, the limit would otherwise be zero. With Q(t) the pivot at
+        the variance t, the limit solves P(chi^2 <= Q(t)) = chance P(chi^2 <= Q(0)). The limit is never below the
+        quantile of `variances`.
         """
         known = self.covariance[None]
         for one in range(component):
@@ -185,8 +187,8 @@ class RandomEffects:
         """Variances by restricted maximum likelihood, shape (1 + factors,).
 
         The restricted likelihood can have several maxima: the search starts from the median of `variances`, from zero,
-        and from each component alone. Among maxima within `_EQUAL` of the highest, the estimate is the one of the least
-        total variance.
+        and from each component alone. Among maxima within `_EQUAL` of the highest, the estimate is the maximum with the
+        least total variance.
         """
         median = np.median(self.variances, axis=0)
         projected = _residual_weights(np.eye(self.values.size)[None], self.design)[0]
@@ -215,7 +217,7 @@ class RandomEffects:
 
     @cached_property
     def excess_of_errors(self) -> tuple[float, float]:
-        """Probability of values that agree so well for their errors, and the share of V that exceeds their scatter.
+        """Return the p-value of the agreement of the values, and the share of V that exceeds their scatter.
 
         The share is 1 - Q/d, where Cochran's Q has d degrees of freedom and all factors are eliminated.
         """
@@ -225,15 +227,15 @@ class RandomEffects:
         return float(chi2.cdf(q, degrees)), min(1 - q / degrees, 1 - _LEAST_OWN)
 
     def with_shared_errors(self, share: float) -> RandomEffects:
-        """Return the model in which a share of the variance of the errors is one error that all values have."""
+        """Return the model in which all values share an error with this share of the variance."""
         common = share * float(np.diagonal(self.covariance).mean())
         return replace(self, covariance=(1 - share) * self.covariance + common)
 
     def chance_of_no_spread(self, component: int) -> float:
-        """Return the probability of groups that differ at least so much where the variance of a component is zero.
+        """Return the p-value of the differences between groups under zero variance of a component.
 
-        Components whose groups lie inside its groups are drawn from their distribution, all others are eliminated: for
-        one component it is that of Cochran's Q.
+        Components whose groups lie inside its groups have their confidence distribution. All other components are
+        eliminated. With one component it is the p-value of Cochran's Q.
         """
         finer, fixed = self._around(component)
         own = _basis(np.hstack([fixed, self._effects[component]])).shape[1] - fixed.shape[1]
@@ -246,7 +248,7 @@ class RandomEffects:
         return float(chi2.sf(seen, own).mean())
 
     def _around(self, component: int) -> tuple[list[int], FloatArray]:
-        """Return the components whose groups lie inside those of this one, and the columns of all others, a basis."""
+        """Return the components whose groups lie inside this component's groups, and a basis of all other columns."""
         inside = list[int]()
         columns = self.design
         for one, z in enumerate(self._effects):
@@ -258,7 +260,7 @@ class RandomEffects:
         return inside, _basis(columns)
 
     def chance_of(self, members: NDArray[np.intp]) -> float:
-        """Return the two-sided probability of the mean of some values, given all others; 1 where they cannot say."""
+        """Return the two-sided p-value of the mean of some values, given all other values; 1 if it is undetermined."""
         rest = np.setdiff1d(np.arange(self.values.size), members)
         design, factors = self.design[rest], [f[rest] for f in self.factors]
         others = RandomEffects(self.values[rest], self.covariance[np.ix_(rest, rest)], design, factors, _FEW_POINTS)
@@ -278,19 +280,19 @@ def _basis(columns: FloatArray) -> FloatArray:
 
 
 def _residual_weights(covariance: FloatArray, columns: FloatArray) -> FloatArray:
-    """Return P = W - W X (X^T W X)^-1 X^T W with W the inverse of each covariance: y^T P y is the residual's square."""
+    """Return P = W - W X (X^T W X)^-1 X^T W, W the inverse of each covariance; y^T P y is the weighted residual."""
     weight = np.linalg.inv(covariance)
     wx = weight @ columns
     return np.asarray(weight - wx @ np.linalg.solve(columns.T @ wx, np.swapaxes(wx, 1, 2)))
 
 
 def _solved(size: FloatArray, square: FloatArray, quantile: FloatArray) -> FloatArray:
-    """Return t >= 0 with sum of u^2 / (l (1 + t l)) = quantile; zero where the sum is below it at t = 0."""
+    """Return t >= 0 with sum of u^2 / (l (1 + t l)) = quantile, or zero if the sum is below it at t = 0."""
     share = np.divide(square, size, out=np.zeros_like(square), where=size > 0)
     largest = share.sum(axis=1)
     least = np.where(size > 0, size, np.inf).min(axis=1)
     low = np.zeros(quantile.size)
-    high = np.maximum(largest / quantile, 1.0) / least  # there the sum is below the quantile
+    high = np.maximum(largest / quantile, 1.0) / least  # the sum is below the quantile
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
         is_above = (share / (1 + middle[:, None] * size)).sum(axis=1) > quantile
@@ -301,7 +303,7 @@ def _solved(size: FloatArray, square: FloatArray, quantile: FloatArray) -> Float
 def _points(count: int, dimensions: int) -> FloatArray:
     """Return points that fill a unit cube evenly, shape (count, dimensions); the first column has equal steps.
 
-    The others are multiples of the powers of 1/x, x^d = x + 1: an additive sequence of low discrepancy.
+    Other columns are multiples of the powers of 1/x, x^d = x + 1: an additive sequence of low discrepancy.
     """
     steps = np.arange(count)
     first = (steps + 0.5) / count

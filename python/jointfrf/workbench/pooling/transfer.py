@@ -1,4 +1,4 @@
-"""Whether one joint explains fits of two or more structures."""
+"""Test whether one joint explains fits of two or more structures."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ __all__ = ["Difference", "Transfer", "transfer"]
 
 @dataclass(frozen=True)
 class Difference:
-    """How one parameter of one structure differs from the joint that all share.
+    """Difference of one parameter of one structure from the common joint.
 
     Attributes
     ----------
     label, name : str
-        Of the fit and of the parameter.
+        Names of the fit and of the parameter.
     value : float
-        ln(own value / common value).
+        Logarithm of the value over the common value.
     std_error : float
-        Of the difference.
+        Standard error of `value`.
     p_value : float
-        Two-sided.
+        Two-sided p-value of the difference.
     """
 
     label: str
@@ -41,19 +41,20 @@ class Difference:
 
 @dataclass(frozen=True)
 class Transfer:
-    """Whether one joint explains several structures; `print` shows it.
+    """Result of the test of one joint in several structures; `print` shows it.
 
     Attributes
     ----------
     statistic : float
-        Weighted squares of the differences from the common joint.
+        Weighted sum of squared differences from the common joint.
     degrees_of_freedom : int
+        Degrees of freedom of the statistic.
     p_value : float
-        Chance of differences at least so large where the joint is the same.
+        p-value under the hypothesis that the joint is the same.
     common : dict of str to float
         Parameters of the common joint.
     differences : tuple of Difference
-        Largest in standard errors first.
+        Differences from the common joint, the largest in standard errors first.
     """
 
     statistic: float
@@ -80,37 +81,43 @@ def transfer(
     parameters: Sequence[str] | None = None,
     spread: Mapping[str, float] | float = 0.0,
 ) -> Transfer:
-    """Test whether one joint explains fits of different structures.
+    """Test whether one joint explains fits of different structures, and return the differences.
 
     Parameters
     ----------
     fits : sequence of Fit, at least 2
-        One for each structure.
+        Fits of the structures, one for each.
     labels : sequence of str, optional
-        "1", "2", ... by default.
+        Names of the fits, default "1", "2", ...
     parameters : sequence of str, optional
-        By default all of the joint that every fit has with a closed interval above zero.
+        Names of parameters, default all parameters of the joint with a bounded interval above zero in every fit.
     spread : float or mapping of str to float
-        Relative standard deviation by which the joint differs from one assembly to the next, as `pool` finds it: then
-        the question is whether the structures differ by more than assemblies do.
+        Relative standard deviation of the joint between assemblies from `pool`, default 0. With a spread the test asks
+        whether structures differ by more than assemblies.
 
     Returns
     -------
     Transfer
+        Statistic, p-value and differences.
 
     Raises
     ------
     ValueError
-        Fewer than two fits; no common parameter; a name that some fit does not have, or has only as a bound; a spread
-        below zero.
+        Fewer than two fits, or no common parameter; a name that some fit does not have, or has only as a bound; a
+        spread below zero.
     TypeError
-        Something in `fits` is no fit.
+        An element of `fits` is no fit.
+
+    See Also
+    --------
+    pool : mean and spread of one joint in several assemblies.
 
     Notes
     -----
-    With x_i the logarithms of fit i and V_i their covariance, x = (sum V_i^-1)^-1 sum V_i^-1 x_i is the common joint,
-    and sum (x_i - x)^T V_i^-1 (x_i - x) is chi-squared with (n - 1) p degrees of freedom. Errors that the fits share
-    are not differences: two fits of one calibration agree better than this says.
+    Let x_i be the logarithms of fit i and V_i their covariance. The common joint is
+    x = (sum V_i^-1)^-1 sum V_i^-1 x_i. The statistic sum (x_i - x)^T V_i^-1 (x_i - x) is chi-squared with (n - 1) p
+    degrees of freedom. Errors that the fits share are not differences: two fits of one calibration agree better than
+    the p-value states.
 
     Examples
     --------

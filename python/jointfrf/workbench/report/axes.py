@@ -1,4 +1,4 @@
-"""What figures share: labels with units, limits of axes and the numbers along them, percentiles."""
+"""Labels with units, limits of axes and the numbers along them, and percentiles of figures."""
 
 from __future__ import annotations
 
@@ -28,33 +28,34 @@ __all__ = [
 
 #: SI prefixes by powers of ten.
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
-#: Units that a prefix may precede, by how they begin; hertz, percent, decibel and lengths are shown as they are.
+#: First letters of units that take a prefix; hertz, percent, decibel and lengths are shown without one.
 _TAKE_PREFIX = ("N", "m/N", "rad/")
-#: Values that are short without a prefix.
+#: Range of values without a prefix.
 _SHORT = (0.1, 1e4)
 #: Decades of a logarithmic axis: below the first, numbers at equal distances; below the second at 1, 2, 5; else at 1.
 _NARROW, _WIDE = 0.7, 2.0
 #: Digits of exponents.
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-#: Numbers along an axis that is short.
+#: Number of values along a short axis.
 _MOST_BESIDE = 5
 
 
 def prefixed_unit(unit: str, largest: float) -> tuple[str, float]:
-    """Choose the SI prefix with which values of a unit are short.
+    """Return a unit with the SI prefix that makes its values short.
 
     Parameters
     ----------
     unit : str
+        Unit without a prefix.
     largest : float
         Largest absolute value.
 
     Returns
     -------
     unit : str
-        With its prefix; as it is where none is needed or usual.
+        Unit with its prefix, or without one if none is needed or usual.
     size : float
-        Its size: values are divided by it.
+        Size of the unit, by which values are divided.
 
     Examples
     --------
@@ -70,7 +71,7 @@ def prefixed_unit(unit: str, largest: float) -> tuple[str, float]:
 
 
 def tick_texts(values: Sequence[float]) -> list[str]:
-    """Write the numbers along an axis, all with as many decimals as the finest needs.
+    """Return the numbers along an axis as texts with equal decimals.
 
     Examples
     --------
@@ -91,14 +92,14 @@ def tick_texts(values: Sequence[float]) -> list[str]:
 
 
 def axis_values(low: float, high: float, most: int, *, log: bool = False) -> list[float]:
-    """Choose values along an axis at which numbers are written; the script of a page that zooms chooses the same.
+    """Return the values of the numbers along an axis; the script of a page that zooms chooses the same values.
 
     Parameters
     ----------
     low, high : float
         Limits, logarithms to base ten with `log`.
     most : int
-        Values at most, about.
+        Approximate largest number of values.
     log : bool
         Whether the axis is logarithmic: values are logarithms, too.
 
@@ -126,7 +127,7 @@ def axis_values(low: float, high: float, most: int, *, log: bool = False) -> lis
 
 
 def value_text(value: float) -> str:
-    """Write a power of ten as one, and other values with four digits.
+    """Return a power of ten as such, and other values with four digits.
 
     Examples
     --------
@@ -152,16 +153,16 @@ class NumberedAxis(NamedTuple):
 def numbered_axis(
     label: str, low: float, high: float, most: int, *, log: bool = False, step: float | None = None
 ) -> NumberedAxis:
-    """Choose the numbers along an axis, in a unit with which they are short.
+    """Return the numbers along an axis, in a unit that makes them short.
 
     Parameters
     ----------
     label : str
-        "quantity, unit".
+        Label, "quantity, unit".
     low, high : float
-        Limits.
+        Limits of the axis.
     most : int
-        Number of values at most, about.
+        Approximate largest number of values.
     log : bool
         Whether the axis is logarithmic.
     step : float, optional
@@ -207,31 +208,31 @@ def format_axis(
 
 #: Label of the axis of all FRFs.
 FREQUENCY = "frequency, Hz"
-#: What is shown of a distribution.
+#: Names of the median and the limits of a distribution.
 _SPREAD = (2.5, 50, 97.5)
 #: Percentiles between which most values lie.
 _BULK = (5, 95)
-#: Margin around what is shown, as a share of its extent, and at least as a share of the largest value.
+#: Margin around the values, as a share of their extent, and at least as a share of the largest value.
 _ROOM, _LEAST_ROOM = 0.15, 0.05
-#: The same where nothing but rounding limits what is shown: numbers along the axis have six digits then.
+#: Least margin for exact values: numbers along the axis then have six digits.
 _ROUNDING = 1e-5
-#: How far an axis reaches from a value that is shown in any case, in such values.
+#: Distance of the limits of an axis from the value `around`, as a multiple of it.
 _FURTHEST = 3.0
 
 
 def symbol(parameter: Parameter) -> str:
-    """Write a parameter as a formula: k_Mtheta as k with index M theta."""
+    """Return a parameter as a formula: k_Mtheta as k with index M theta."""
     index = ",".join(dict.fromkeys((parameter.row, parameter.column))).replace("theta", "\\theta ").strip()
     return f"${parameter.kind}_{{{index}}}$"
 
 
 def parameter_label(parameter: Parameter) -> str:
-    """Label of an axis: a parameter and its unit."""
+    """Return the label of an axis: a parameter and its unit."""
     return f"{symbol(parameter)}, {parameter.unit}"
 
 
 def modulus_label(points: str, dof: str) -> str:
-    """Label of an axis: the modulus of a receptance with response and force at the same DOF, and its unit.
+    """Return the label of an axis: the modulus of a receptance with response and force at the same DOF, and its unit.
 
     Examples
     --------
@@ -243,24 +244,26 @@ def modulus_label(points: str, dof: str) -> str:
 
 
 def bands_in_words(bands: Iterable[Band]) -> str:
-    """Write bands for a reader, "200-400, 650-800"."""
+    """Return bands as text, "200-400, 650-800"."""
     return ", ".join(f"{low:g}-{high:g}" for low, high in bands)
 
 
 def parameter_lines(k_lines: ComplexArray, freq_hz: FloatArray, parameter: Parameter) -> FloatArray:
-    """Values of one parameter line by line: Re K* of a stiffness, Im K*, or Im K*/w of a viscous damping.
+    """Return values of one parameter line by line: Re K* of a stiffness, Im K*, or Im K*/w of a viscous damping.
 
     Parameters
     ----------
     k_lines : ndarray, shape (..., n_freq)
-        The entry of K* that the parameter belongs to, N/m.
+        Entry of K* to which the parameter belongs, N/m.
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Lines, Hz.
     parameter : Parameter
+        Stiffness or damping.
 
     Returns
     -------
     ndarray, shape (..., n_freq)
+        Values in the unit of the parameter.
     """
     if parameter.kind == "k":
         return k_lines.real
@@ -268,13 +271,13 @@ def parameter_lines(k_lines: ComplexArray, freq_hz: FloatArray, parameter: Param
 
 
 def percentiles(values: FloatArray) -> tuple[float, float, float]:
-    """2.5, 50 and 97.5 percentile of values."""
+    """Return the 2.5, 50 and 97.5 percentile of values."""
     low, median, high = (float(x) for x in np.percentile(values, _SPREAD))
     return low, median, high
 
 
 def percentile_lines(lines: FloatArray) -> FloatArray:
-    """2.5, 50 and 97.5 percentile at each frequency, shape (3, n_freq), of lines of shape (r, n_freq)."""
+    """Return the 2.5, 50 and 97.5 percentile at each frequency, shape (3, n_freq), of lines of shape (r, n_freq)."""
     return np.asarray(np.percentile(lines, _SPREAD, axis=0), np.float64)
 
 
@@ -284,22 +287,23 @@ def bulk_limits(
     around: float | None = None,
     least_room: float = _LEAST_ROOM,
 ) -> tuple[float, float]:
-    """Limits of an axis that show nine tenths of the values: a few lines near a singular matrix would hide them.
+    """Return limits of an axis for nine tenths of the values: a few lines near a singular matrix would hide them.
 
     Parameters
     ----------
     values : sequence of ndarray
-        NaN and Inf do not count.
+        Values, without regard to NaN and Inf.
     shown : sequence of float
-        Values that lie within the limits in any case.
+        Values that are always within the limits.
     around : float, optional
-        One more such value; the limits do not go further from it than three times its size.
+        Further value within the limits, from which they are at most three times its size away.
     least_room : float
-        Margin at least, as a share of the largest value: 0 where intervals say how exact values are.
+        Least margin, as a share of the largest value: 0 if intervals show the accuracy of the values.
 
     Returns
     -------
     low, high : float
+        Limits of the axis.
 
     Examples
     --------
@@ -316,6 +320,6 @@ def bulk_limits(
     if around is not None:
         reach = _FURTHEST * abs(around) or np.inf
         low, high = max(min(low, around), around - reach), min(max(high, around), around + reach)
-    # Round-off is not to fill a panel.
+    # Rounding must not fill a panel.
     room = max(_ROOM * (high - low), max(least_room, _ROUNDING) * max(abs(low), abs(high))) or 1.0
     return float(low - room), float(high + room)

@@ -18,15 +18,15 @@ from jointfrf.workbench.report.figure import Curve, Figure, Panel, Ribbon
 
 __all__ = ["Chart", "chart_view", "style_rules", "thinned_dots", "thinned_line"]
 
-#: Units of the paths along x and y: what a screen cannot show at full width may still be seen when zoomed in.
+#: Units of the paths along x and y, finer than a screen for zooming.
 _WIDE, _HIGH = 20000, 8000
-#: How far off the panel a curve is drawn, in heights of it.
+#: Distance above and below the panel up to which a curve is drawn, in heights of the panel.
 _OFF = 3
-#: Numbers along x and along y that fit beside each other on a narrow screen.
+#: Largest number of values along x and along y, for a narrow screen.
 _MOST_X, _MOST_Y = 6, 5
-#: A step along x so many times longer than those beside it parts a curve.
+#: Ratio of a step along x to its neighbours above which a curve has a gap.
 _GAP = 6.0
-#: Dots and outlying lines, points wide.
+#: Width of dots and of marks of outlying lines, points.
 _DOT, _CROSS = 2.4, 4.0
 #: Lightness of colours on a dark page: from, to.
 _DARK = (0.36, 0.92)
@@ -34,7 +34,7 @@ _DARK = (0.36, 0.92)
 
 @dataclass(frozen=True)
 class Chart:
-    """A figure that readers can zoom: `alt` says in words what it shows, `most` how many points a curve may have."""
+    """A figure that readers can zoom, with its description in words (`alt`) and the most points of a curve (`most`)."""
 
     figure: Figure
     alt: str
@@ -42,7 +42,7 @@ class Chart:
 
 
 def chart_view(chart: Chart) -> dict[str, Any]:
-    """Return what the template shows of a chart."""
+    """Return the fields of a chart for the template."""
     figure = chart.figure
     panels = [_panel_view(panel, chart.most) for panel in figure.panels if not panel.is_blank]
     legend: dict[str, str] = {}
@@ -99,7 +99,7 @@ def _panel_view(panel: Panel, most: int) -> dict[str, Any]:
 
 
 def _limits(panel: Panel) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the limits along x and y: those of the panel, or those of its curves."""
+    """Return the limits along x and y of the panel, or of its curves."""
     low = min((float(curve.x[0]) for curve in panel.curves if curve.x.size), default=0.0)
     high = max((float(curve.x[-1]) for curve in panel.curves if curve.x.size), default=0.0)
     x_ends = panel.x_limits or ((low, high) if high > low else (low - 0.5, high + 0.5))
@@ -114,7 +114,7 @@ def _limits(panel: Panel) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def _path(curve: Curve, place_x: Any, place_y: Any, most: int) -> str:
-    """Write a curve as steps from point to point; dots as lines without a length."""
+    """Return a curve as steps from point to point, and dots as lines without a length."""
     dots = STYLES[curve.style].dashes is None
     kept = (thinned_dots if dots else thinned_line)(np.asarray(curve.y, np.float64), most)
     x, y = (np.round(place(values[kept])) for place, values in ((place_x, curve.x), (place_y, curve.y)))
@@ -138,7 +138,7 @@ def _path(curve: Curve, place_x: Any, place_y: Any, most: int) -> str:
 
 
 def _parts(x: FloatArray) -> NDArray[np.intp]:
-    """Return the number of the part of a curve that each point is in: between bands there is nothing to draw."""
+    """Return the number of the part of a curve for each point; between parts, as between bands, there are no lines."""
     step = np.diff(x)
     beside = np.fmax(np.r_[-np.inf, step[:-1]], np.r_[step[1:], -np.inf])
     return np.r_[0, np.cumsum((beside > 0) & (step > _GAP * beside))] if step.size > 1 else np.zeros(x.size, np.intp)
@@ -152,7 +152,7 @@ def _area(ribbon: Ribbon, place_x: Any, place_y: Any) -> str:
 
 
 def style_rules(charts: Iterable[Chart]) -> str:
-    """Write the rules of style of all curves of charts: on a light page and on paper, then on a dark page."""
+    """Return the rules of style of all curves of charts: on a light page and on paper, then on a dark page."""
     panels = [panel for chart in charts for panel in chart.figure.panels]
     lines = dict.fromkeys(curve.style for panel in panels for curve in panel.curves)
     areas = dict.fromkeys(area.style for panel in panels for area in panel.ribbons)
@@ -174,7 +174,7 @@ def _line_rule(name: str, style: Style) -> str:
 
 
 def _on_dark(colour: str) -> str:
-    """Return a colour that is as far from black as it was from white."""
+    """Return a colour with the distance from black that it has from white."""
     red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
     hue, light, much = colorsys.rgb_to_hls(red, green, blue)
     least, most = _DARK
@@ -182,24 +182,24 @@ def _on_dark(colour: str) -> str:
     return "#" + "".join(f"{round(255 * part):02x}" for part in found)
 
 
-#: Dots of a column that are kept: its extremes, and some between.
+#: Number of dots of a column that are kept: its extremes, and some between.
 _DOTS = 5
 
 
 def thinned_line(y: FloatArray, most: int) -> NDArray[np.intp]:
-    """Choose points of a curve: of each of `most` / 2 columns of neighbouring points the lowest and the highest.
+    """Return points of a curve: the lowest and the highest of each of `most` / 2 columns of neighbouring points.
 
     Parameters
     ----------
     y : ndarray, shape (n,)
-        Values in the order of x; NaN makes a gap, which stays where it is a column wide.
+        Values in the order of x; NaN makes a gap, which is kept if it is at least a column wide.
     most : int
-        Points at most.
+        Largest number of points.
 
     Returns
     -------
     ndarray of int
-        Increasing.
+        Indices of the points, increasing.
 
     Examples
     --------
@@ -221,7 +221,7 @@ def thinned_line(y: FloatArray, most: int) -> NDArray[np.intp]:
 
 
 def thinned_dots(y: FloatArray, most: int) -> NDArray[np.intp]:
-    """Choose dots: of each column of neighbours the lowest, the highest, and others evenly spread; as `thinned_line`.
+    """Return dots: the lowest, the highest, and evenly spread dots of each column of neighbours; see `thinned_line`.
 
     Examples
     --------

@@ -40,11 +40,11 @@ __all__ = [
     "write_document",
 ]
 
-#: Up to so many columns fit on any screen; more than so many are written smaller; more than so many become rows.
+#: Columns that fit on any screen; columns above which a table is written smaller, and above which they become rows.
 _NARROW, _WIDE, _WIDEST = 4, 9, 12
-#: Where templates and styles are.
+#: Folder of templates and styles.
 _FOLDER = Path(__file__).parent
-#: A map with more columns is written smaller.
+#: Number of columns above which a map is written smaller.
 _DENSE = 8
 
 
@@ -52,7 +52,7 @@ _DENSE = 8
 class Words:
     """Sentences: paragraphs, or with `kind` a list of notes, warnings or findings.
 
-    `folded` has for each sentence the texts that are shown when the reader asks for them, and on paper.
+    `folded` has for each sentence the texts that a click shows, and that paper shows.
     """
 
     sentences: Sequence[str]
@@ -61,7 +61,7 @@ class Words:
 
 
 class Picture(NamedTuple):
-    """A figure that is drawn already: its SVG file becomes part of the page. A `Figure` is drawn for its page."""
+    """A drawn figure, whose SVG file becomes part of the page. A `Figure` is drawn for its page."""
 
     figure: Figure
     drawing: Drawing
@@ -69,7 +69,7 @@ class Picture(NamedTuple):
 
 @dataclass(frozen=True)
 class Sketch:
-    """A drawing of our own: SVG whose colours follow the page, its caption, and the same in words."""
+    """A sketch: SVG whose colours follow the page, its caption, and its description in words."""
 
     key: str
     svg: str
@@ -81,7 +81,7 @@ class Sketch:
 class HeatMap:
     """Numbers by row and column, shaded from `light` (no shade) to `dark`; NaN is left empty.
 
-    With `log` the shade goes with the logarithm, up to the largest value if that is above `dark`.
+    With `log` the shade is proportional to the logarithm, up to the largest value if it is above `dark`.
     """
 
     key: str
@@ -98,14 +98,14 @@ class HeatMap:
 
     @property
     def darkest(self) -> float:
-        """The value of the darkest shade."""
+        """Value of the darkest shade."""
         finite = self.values[np.isfinite(self.values)]
         return max(self.dark, float(finite.max())) if self.log and finite.size else self.dark
 
 
 @dataclass(frozen=True)
 class Listing:
-    """A text shown as it is written when the reader asks for it; with `printed` on paper, too."""
+    """A verbatim text that a click shows; with `printed` on paper, too."""
 
     name: str
     text: str
@@ -117,7 +117,7 @@ Part = Table | Words | Figure | Picture | Chart | Sketch | HeatMap | Listing
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what follows it; `more` are parts shown when the reader asks for them, under a name.
+    """A heading and its parts; `more` are parts that a click on their name shows.
 
     A part that is None, or a table or text without content, is left out.
     """
@@ -152,16 +152,16 @@ def _is_empty(part: Part | None) -> bool:
 
 
 def section_of_command(command: str) -> Section:
-    """Return the section that says how a page was made."""
+    """Return the section with the command that made a page."""
     return Section("made", "How this was made", [Listing("", command)])
 
 
-#: Characters of a finding that stand in one line of a page.
+#: Largest number of characters of a finding in one line of a page.
 _ONE_LINE = 84
 
 
 def words_of_findings(findings: Sequence[Finding]) -> list[Words]:
-    """Return warnings and notes as lists, the worst first: a line for each code; all of a long text is folded below it.
+    """Return warnings and notes as lists, the worst first, with a line for each code and long texts folded below it.
 
     Examples
     --------
@@ -191,7 +191,7 @@ def words_of_findings(findings: Sequence[Finding]) -> list[Words]:
 
 
 def _head(texts: Sequence[str]) -> str:
-    """Return the line of a group of findings: the first, as far as it goes in a line."""
+    """Return the line of a group of findings: the first one, cut to one line."""
     first, more = texts[0], f" (and {len(texts) - 1} more)" if len(texts) > 1 else ""
     if len(first) > _ONE_LINE:
         ends = [match.start() for match in re.finditer(r"[;,:(](?= )|(?<= )[(]| (?=%|and|which|because)", first)]
@@ -201,11 +201,12 @@ def _head(texts: Sequence[str]) -> str:
 
 
 def make_document(document: Document) -> str:
-    """Write a page.
+    """Return a page as HTML.
 
     Parameters
     ----------
     document : Document
+        Content of the page.
 
     Returns
     -------
@@ -246,7 +247,7 @@ def write_document(document: Document, path: Path | str) -> Path:
 
 
 def _policy(script: str) -> str:
-    """Return what a browser lets the page do: show itself and run this script; nothing is loaded, nothing is sent."""
+    """Return the security policy of the page: run this script, load nothing, send nothing."""
     checksum = b64encode(sha256(script.encode("utf-8")).digest()).decode("ascii")
     allowed = f"'sha256-{checksum}'" if script else "'none'"
     return (
@@ -256,12 +257,12 @@ def _policy(script: str) -> str:
 
 
 def _seen(value: Any) -> Any:
-    """Return what is shown: texts with the characters escaped that are not seen; markup of our own as it is."""
+    """Return a value with invisible characters of texts escaped; markup stays unchanged."""
     return visible(value, "\n\t") if type(value) is str else value
 
 
 def _style(parts: Sequence[Part], charts: Sequence[Chart]) -> str:
-    """Return the rules of style of a page: those of all pages, and those of the parts it has."""
+    """Return the rules of style of a page: common rules, and rules of its parts."""
     kinds = {"chart": Chart, "map": HeatMap, "sketch": Sketch}
     names = ["page", *(name for name, kind in kinds.items() if any(isinstance(part, kind) for part in parts))]
     rules = [(_FOLDER / f"{name}.css").read_text(encoding="utf-8") for name in names]
@@ -269,7 +270,7 @@ def _style(parts: Sequence[Part], charts: Sequence[Chart]) -> str:
 
 
 def _view(part: Part) -> dict[str, Any]:
-    """Return what the template shows of a part; `kind` names its macro."""
+    """Return the fields of a part for the template; `kind` names its macro."""
     shown: dict[str, Any] = {}
     if isinstance(part, Figure):
         part = Picture(part, draw(part, png=False))
@@ -285,7 +286,7 @@ def _view(part: Part) -> dict[str, Any]:
 
 
 def _as_address(svg: bytes) -> str:
-    """Return a drawing as the address of an image, in a quarter less than base64 takes."""
+    """Return a drawing as the address of an image, a quarter shorter than base64."""
     text = re.sub("<[^<>]*>", lambda tag: tag[0].replace("'", "").replace('"', "'"), svg.decode())
     return "data:image/svg+xml," + quote(" ".join(text.split()), safe=" !$&'()*+,-./:;=?@_~|")
 
@@ -306,7 +307,7 @@ def _map_view(part: HeatMap) -> dict[str, Any]:
 
 
 def _map_text(value: float, digits: int) -> str:
-    """Write a cell of a map: of large values as many decimals less as they have digits more."""
+    """Return the text of a cell of a map, with fewer decimals for larger values."""
     if np.isnan(value):
         return ""
     return f"{value:.{max(digits - (int(np.log10(abs(value))) if abs(value) >= 1 else 0), 0)}f}"
@@ -330,7 +331,7 @@ def _shape(table: Table) -> str:
 
 
 def _marked(parameter: Parameter) -> str:
-    """Write a parameter with its index and Greek letter."""
+    """Return a parameter with its index and Greek letter as markup."""
     from markupsafe import Markup
 
     index = ",".join(dict.fromkeys((parameter.row, parameter.column))).replace("theta_", "θ").replace("theta", "θ")

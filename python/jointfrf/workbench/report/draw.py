@@ -18,14 +18,14 @@ __all__ = ["STYLES", "Drawing", "Style", "draw", "laid_out", "shortened"]
 
 
 class Drawing(NamedTuple):
-    """A figure as a file: PNG for documents, empty unless asked for, and SVG, sharp at every size."""
+    """A figure as files: PNG for documents (empty by default), and SVG."""
 
     png: bytes
     svg: bytes
 
 
 class Style(NamedTuple):
-    """How a curve is drawn; lengths of dashes and gaps in widths of the line, None for dots without a line."""
+    """Style of a curve; lengths of dashes and gaps in widths of the line, None for dots without a line."""
 
     colour: str
     dashes: tuple[float, ...] | None
@@ -33,7 +33,7 @@ class Style(NamedTuple):
     marker: str = ""
 
 
-#: Curves differ by lightness and dashes, too, for prints in grey.
+#: Styles that also differ by lightness and dashes, for prints in grey.
 STYLES = {
     "actual": Style("#000000", (), 1.5),
     "initial": Style("#8c8c8c", (4, 1.6), 1.2),
@@ -68,13 +68,13 @@ STYLES = {
 _SHADES = ("#ececec", "#d2d2d2", "#bdbdbd")
 #: Dots an inch of a PNG file, and of images inside an SVG file; size of markers, points.
 _RESOLUTION, _RESOLUTION_INSIDE, _MARKER = 130, 96, 2.5
-#: Width of thin curves, as a share of that of others.
+#: Width of thin curves, as a share of the usual width.
 _THIN = 0.55
-#: Styles of curves with more detail than lines are good for: an image in a drawing of lines.
+#: Styles of curves with so much detail that they are drawn as images.
 _DENSE = ("faint", "dots")
-#: The middle of a distribution is seen through what lies around it.
+#: Opacity of the area around the middle of a distribution.
 _ON_TOP, _HALO = ("ismm", "compliance"), 1.2
-#: Numbers along x at most, and where panels stand beside each other.
+#: Largest number of values along x, with one panel and with several panels in a row.
 _MOST, _MOST_BESIDE = 10, 5
 #: Size of a heading, points.
 _HEADING = 10
@@ -86,27 +86,28 @@ _INTERVALS = (0.7, 0.36)
 _VIEW = np.array([[-0.419, 0.0, 0.908], [0.410, 0.893, 0.189], [-0.810, 0.451, -0.374]])
 #: Arrows that show the axes of space: their length as a share of the height of what is drawn, and place of the letters.
 _ARROW, _LETTER = 0.28, 1.45
-#: Texts stay texts; points that lie within 0.2 pixels of a line are left out.
+#: Settings that keep texts as texts and leave out points within 0.2 pixels of a line.
 _SETTINGS = {"svg.fonttype": "none", "path.simplify_threshold": 0.2}
-#: Sizes that are read in a page of text width, and grids that stay behind the curves.
+#: Settings of sizes for a page of text width, and of grids behind the curves.
 _FONTS = {"font.sans-serif": ["DejaVu Sans"], "font.size": 8.5, "axes.titlesize": 9,
           "legend.fontsize": 7.5, "axes.grid": True, "grid.alpha": 0.3,
           "grid.linewidth": 0.5, "axes.axisbelow": True, "lines.solid_capstyle": "round"}  # fmt: skip
 
 
 def draw(figure: Figure, png: bool = True) -> Drawing:
-    """Draw a figure.
+    """Draw a figure, and return its files.
 
     Parameters
     ----------
     figure : Figure
+        Figure as data.
     png : bool
-        Whether to draw a PNG file, too, which takes two fifths longer.
+        Whether to draw a PNG file, too, which takes two fifths longer; default True.
 
     Returns
     -------
     Drawing
-        The same data give the same files.
+        Files, which are equal for equal data.
     """
     canvas = laid_out(figure)
     pixels, vectors = io.BytesIO(), io.BytesIO()
@@ -122,7 +123,7 @@ def draw(figure: Figure, png: bool = True) -> Drawing:
 
 
 def laid_out(figure: Figure) -> Any:
-    """Return a figure as matplotlib has it, `matplotlib.figure.Figure`, not yet drawn."""
+    """Return a figure as `matplotlib.figure.Figure`, not yet drawn."""
     check_extras("matplotlib")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Canvas
@@ -154,9 +155,10 @@ def laid_out(figure: Figure) -> Any:
 
 
 def _settings(figure: Figure) -> Any:
-    """Return the settings of matplotlib for a figure, which hold inside a `with` block only.
+    """Return the settings of matplotlib for a figure, for a `with` block.
 
-    They are all set: a `matplotlibrc` of the working directory may be a stranger's, and `text.usetex` starts programs.
+    All settings are replaced, because a `matplotlibrc` in the working directory is untrusted: `text.usetex` starts
+    programs.
     """
     from matplotlib import style
 
@@ -165,7 +167,7 @@ def _settings(figure: Figure) -> Any:
 
 @lru_cache(1000)
 def _drawable(words: str) -> str:
-    """Return a text of whatever source as it can be drawn: wrong formulas and invisible characters escaped."""
+    """Return a text that can be drawn: wrong formulas and invisible characters are escaped."""
     from matplotlib.mathtext import MathTextParser
 
     words = visible(words, "\n")
@@ -178,7 +180,7 @@ def _drawable(words: str) -> str:
 
 
 def _row_heights(figure: Figure) -> list[float]:
-    """Heights of the rows of panels, inches."""
+    """Return the heights of the rows of panels, inches."""
     rows = [figure.panels[i : i + figure.columns] for i in range(0, len(figure.panels), figure.columns)]
     heights = []
     for row in rows:
@@ -209,7 +211,7 @@ def _draw_panel(ax: Any, panel: Panel, beside: int) -> None:
 
 
 def _add_legend(canvas: Any, axes: list[Any]) -> None:
-    """One legend below all panels, each label once: it never covers data."""
+    """Add one legend below all panels, with each label once."""
     found: dict[str, Any] = {}
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
@@ -220,7 +222,7 @@ def _add_legend(canvas: Any, axes: list[Any]) -> None:
 
 
 def _look(style: str, share: float = 1.0) -> dict[str, Any]:
-    """Return colour, dashes and width of a line as matplotlib takes them."""
+    """Return colour, dashes and width of a line for matplotlib."""
     colour, dashes, width, _ = STYLES[style]
     return {"color": colour, "ls": "" if dashes is None else (0, dashes) if dashes else "-", "lw": share * width}
 
@@ -270,7 +272,7 @@ def _draw_surface(ax: Any, surface: Surface) -> None:
 
     faces, values, edges = surface.faces, surface.values, surface.edges
     if surface.in_space:
-        order = np.argsort((faces @ _VIEW[2]).mean(axis=1))  # what is near is drawn last
+        order = np.argsort((faces @ _VIEW[2]).mean(axis=1))  # near faces are drawn last
         faces, values = (faces @ _VIEW[:2].T)[order], values[order]
         edges = None if edges is None else edges @ _VIEW[:2].T
     if edges is not None:
@@ -290,7 +292,7 @@ def _draw_surface(ax: Any, surface: Surface) -> None:
 
 
 def _draw_axes_of_space(axes: list[Any]) -> None:
-    """Give drawings in space one scale, and arrows along the axes in the corner that one along z leaves free."""
+    """Set one scale for drawings in space, and draw arrows along the axes in a free corner."""
     for ax in axes:
         ax.set_xlim(min(one.get_xlim()[0] for one in axes), max(one.get_xlim()[1] for one in axes))
         ax.set_ylim(min(one.get_ylim()[0] for one in axes), max(one.get_ylim()[1] for one in axes))
@@ -322,7 +324,7 @@ def _draw_intervals(ax: Any, panel: Panel) -> None:
     if panel.x_limits:
         left, right = panel.x_limits
         ax.set_xlim(left, right)
-        # An arrowhead, so that an interval that reaches beyond the axis is not read as one that ends there.
+        # An arrowhead marks an interval that reaches beyond the axis.
         for interval, place in zip(panel.intervals, places, strict=True):
             for edge, marker, reaches in ((left, "<", interval.low < left), (right, ">", interval.high > right)):
                 if reaches:
@@ -335,7 +337,7 @@ _DECIMALS = re.compile(r"(?<!\d)\d++\.\d{3,}")
 
 
 def shortened(svg: str) -> str:
-    r"""Write a drawing of matplotlib shorter: without comments, with places in hundredths of a typographic point.
+    r"""Return a drawing of matplotlib without comments, with places in hundredths of a typographic point.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Figures as data: what each shows, before anything draws it."""
+"""Figures as data, independent of the program that draws them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NamedBands = tuple[tuple[str, tuple[Band, ...]], ...]
 
 @dataclass(frozen=True)
 class Curve:
-    """A line: y over x, drawn in one of `draw.STYLES`; `thin` where it is not to hide others."""
+    """A line: y over x, drawn in one of `draw.STYLES`; `thin` if it must not hide other lines."""
 
     label: str
     x: FloatArray
@@ -64,7 +64,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Interval:
-    """A median with its 2.5 and 97.5 percentiles, and a published value beside it."""
+    """A median with its 2.5 and 97.5 percentiles, and a published value."""
 
     label: str
     low: float
@@ -96,9 +96,9 @@ class Panel:
     """Axes of a figure.
 
     Labels are "quantity, unit". An empty `x_label` leaves out the numbers, too: the panel below shares them.
-    `shades` are (label, bands) in Hz; `strips` are bands drawn as bars at the bottom. `y_step` is the distance of the
-    numbers along y, where it is not to be chosen; `height` is relative to that of other panels; `interval_names` are
-    what the middle and the limits of intervals are. A panel that holds nothing is left blank.
+    `shades` are (label, bands) in Hz. `strips` are bands drawn as bars at the bottom. `y_step` is the distance of the
+    numbers along y; without it the figure chooses. `height` is relative to other panels. `interval_names` are the names
+    of the middle and the limits of intervals. A panel without content is left blank.
     """
 
     title: str
@@ -121,7 +121,7 @@ class Panel:
 
     @property
     def is_blank(self) -> bool:
-        """Whether it holds nothing."""
+        """Whether the panel is empty."""
         return not (self.curves or self.ribbons or self.levels or self.intervals or self.surface)
 
 
@@ -132,15 +132,17 @@ class Figure:
     Attributes
     ----------
     key : str
-        Name of its files.
+        Name of the files of the figure.
     caption : str
-        Its caption on a page.
+        Caption on a page.
     panels : tuple of Panel
+        Panels, row by row.
     columns : int
+        Number of panels in a row.
     number : str
-        Its number in the source, or empty.
+        Number of the figure in the source, or empty.
     heading : str
-        Title above the panels, where the figure is a file of its own.
+        Title above the panels if the figure is a separate file.
     """
 
     key: str
@@ -152,13 +154,13 @@ class Figure:
 
 
 def figure_csv(figure: Figure) -> str:
-    """Write the data of a figure as CSV, a line for each point: panel, curve, x, y and the upper limit of an area."""
+    """Return the data of a figure as CSV, a line for each point: panel, curve, x, y and the upper limit of an area."""
     rows = ((panel.title or str(i), *row) for i, panel in enumerate(figure.panels, 1) for row in _panel_rows(panel))
     return csv_text([("panel", "curve", "x", "y", "y_high"), *rows])
 
 
 def _panel_rows(panel: Panel) -> Iterator[tuple[object, ...]]:
-    """Rows of a panel: curve, x, y and the upper limit of an area."""
+    """Yield rows of a panel: curve, x, y and the upper limit of an area."""
     for curve in panel.curves:
         yield from ((curve.label, x, y, "") for x, y in zip(curve.x.tolist(), curve.y.tolist(), strict=True))
     for area in panel.ribbons:
@@ -186,7 +188,7 @@ _DEFLECTION = 0.12
 
 @dataclass(frozen=True)
 class MovingBody:
-    """The outside of a body and how its nodes move.
+    """Surface of a body, and displacements of its nodes.
 
     Attributes
     ----------
@@ -204,11 +206,12 @@ class MovingBody:
 
 
 def deformed_surface(bodies: Sequence[MovingBody]) -> Surface:
-    """Draw bodies in a common motion: deformed true to scale, darker where they move more, outlines at rest.
+    """Return deformed bodies true to scale, darker where they move more, with outlines at rest.
 
     Parameters
     ----------
     bodies : sequence of MovingBody
+        Bodies in a common motion.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Figures of one identification: the joint over frequency, which frequencies determine it; their files."""
+"""Figures of one identification: the joint and the information on it over frequency; their files."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ __all__ = ["fit_figures", "fit_information", "plot", "shown_name", "write_fit"]
 
 
 def fit_figures(fit: Fit) -> list[Figure]:
-    """Figures of the identified joint: K* and compliance of each DOF, line by line and as fitted.
+    """Return figures of the identified joint: K* and compliance of each DOF, line by line and as fitted.
 
     Parameters
     ----------
     fit : Fit
-        What `identify` found.
+        Result of `identify`.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def _inverted(k_lines: ComplexArray) -> ComplexArray:
 
 
 def _stiffness_found(fit: Fit, freq_hz: FloatArray) -> ComplexArray:
-    """Return K*(w) of the joint found, shape (n_freq, n, n); NaN at rigid DOFs."""
+    """Return K*(w) of the fitted joint, shape (n_freq, n, n); NaN at rigid DOFs."""
     if fit.laws is None or not fit.laws.rigid:
         return fit.k_joint(freq_hz)
     k = np.full((freq_hz.size, len(fit.dofs), len(fit.dofs)), np.nan + 0j)
@@ -104,7 +104,7 @@ def _stiffness_found(fit: Fit, freq_hz: FloatArray) -> ComplexArray:
 
 
 def _of_law(fit: Fit, dof: str, freq_hz: FloatArray) -> tuple[tuple[Ribbon, ...], tuple[Ribbon, ...]]:
-    """Confidence intervals of Re K* and Im K* of a law at each frequency, from the covariance of its parameters."""
+    """Return confidence intervals of Re K* and Im K* of a law at each frequency, by the covariance of parameters."""
     assert fit.laws is not None
     law, names = fit.laws.laws[dof, dof], [one.name for one in fit.parameters]
     fields = enumerate(parameter_name(field.name, dof, dof) for field in law.fields)
@@ -121,7 +121,7 @@ def _of_law(fit: Fit, dof: str, freq_hz: FloatArray) -> tuple[tuple[Ribbon, ...]
 
 
 def _intervals(fit: Fit, stiffness: Parameter, freq_hz: FloatArray) -> tuple[tuple[Ribbon, ...], tuple[Ribbon, ...]]:
-    """Confidence intervals of a stiffness, and of the damping of its DOF if that is one term; none that are open."""
+    """Return bounded intervals of a stiffness, and of the damping of its DOF if the damping is one term."""
     dof = stiffness.row
     if fit.laws is not None:
         return _of_law(fit, dof, freq_hz)
@@ -149,7 +149,7 @@ def _panel(
     label: str, freq: FloatArray, each: FloatArray, used: NDArray[np.bool_], found: Curve | None,
     ribbons: tuple[Ribbon, ...],
 ) -> Panel:  # fmt: skip
-    """Draw one part of K* or C: each line by itself, what was found of all, and its intervals."""
+    """Return a panel of one part of K* or C: each line alone, the fit of all lines, and its intervals."""
     is_known = np.isfinite(each[used]).any()
     curves = [Curve("each line", freq[used], each[used], "dots")] if is_known else []
     shown: list[float] = []
@@ -159,7 +159,7 @@ def _panel(
     if not used.all():
         curves.append(Curve("lines left out", freq[~used], each[~used], "outlying"))
     if ribbons and not is_known:
-        # Without lines by themselves the axis fits the interval.
+        # Without single lines the axis fits the interval.
         shown += [float(end) for one in ribbons for end in (one.low.min(), one.high.max())]
         limits = bulk_limits([], shown, least_room=0.0)
     else:
@@ -168,23 +168,23 @@ def _panel(
 
 
 def write_fit(fits: Sequence[Fit], folder: Path, source: str, figures: Sequence[Figure] = ()) -> list[Path]:
-    """Write ``identification.json`` and a PNG and an SVG file a DOF for each fit; nothing is left half-written.
+    """Write ``identification.json``, and a PNG and an SVG file for each DOF of each fit, and return their paths.
 
     Parameters
     ----------
     fits : sequence of Fit
-        Results on the same data; the figures of the second and later ones carry their method in the name.
+        Results on the same data. The names of figures of the second and later fits contain the method.
     folder : Path
-        Made if it is missing.
+        Folder of the files, made if it is missing.
     source : str
-        Name of the file that was measured, written into the JSON.
+        Name of the measured file, for the JSON.
     figures : sequence of Figure
-        Drawn beside those of the fits.
+        Further figures, default none.
 
     Returns
     -------
     list of Path
-        What was written.
+        Written files, each whole or not at all.
 
     Raises
     ------
@@ -204,7 +204,7 @@ def write_fit(fits: Sequence[Fit], folder: Path, source: str, figures: Sequence[
     return [own.write(clean_name(name), content) for name, content in contents.items()]
 
 
-#: Parts of the band over which shares are summed, and lines a part at least.
+#: Number of parts of the band over which shares are summed, and least number of lines of a part.
 _PARTS, _LEAST = 48, 4
 #: Shares of the information below the frequencies in the table.
 _QUANTILES = (0.1, 0.5, 0.9)
@@ -222,7 +222,7 @@ def shown_name(one: FittedParameter) -> Cell:
 
 
 def fit_information(fit: Fit) -> tuple[Figure | None, Table | None]:
-    """Return where in frequency the information on each parameter lies, for a fit of FRFs between all joint DOFs.
+    """Return the information on each parameter over frequency, for a fit of FRFs between all joint DOFs.
 
     Returns
     -------
@@ -247,7 +247,7 @@ def fit_information(fit: Fit) -> tuple[Figure | None, Table | None]:
 
 
 def _information_figure(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Figure | None:
-    """Draw the share of each part of the band in what is known of the parameters of each DOF; None for few lines."""
+    """Return a figure of the information of each part of the band on each parameter, or None for few lines."""
     parts = min(_PARTS, freq_hz.size // _LEAST)
     if parts < 3 or freq_hz[-1] == freq_hz[0]:
         return None
@@ -269,7 +269,7 @@ def _information_figure(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Fi
     return Figure("information", caption, tuple(panels), 2 if len(panels) > 1 else 1)
 
 
-#: FRFs that are drawn, two beside each other.
+#: Largest number of FRFs that are drawn, two in a row.
 _FRFS = 4
 
 
@@ -279,17 +279,21 @@ def plot(fit: Fit) -> Any:
     Parameters
     ----------
     fit : Fit
-        A fit that was loaded shows no FRFs.
+        Result of `identify` or `identify_model`. FRFs are drawn unless the fit was loaded from a file.
 
     Returns
     -------
     matplotlib.figure.Figure
-        ``jf.plot(fit).savefig("joint.png")`` writes it.
+        Figure, which ``jf.plot(fit).savefig("joint.png")`` writes.
 
     Raises
     ------
     MissingPackageError
         matplotlib is missing.
+
+    See Also
+    --------
+    write_report : page of a fit.
     """
     check_type("fit", fit, Fit)
     panels: list[Panel] = []

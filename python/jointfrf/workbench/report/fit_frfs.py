@@ -20,17 +20,17 @@ from jointfrf.workbench.report.receptance import ReceptanceCurve, receptance_pan
 
 __all__ = ["ComparedFrfs", "assurance", "compare_fit", "frf_figures", "frf_maps"]
 
-#: FRFs that are drawn at most.
+#: Largest number of FRFs that are drawn.
 _MOST = 24
-#: An FRF with less noise than this share of it has none.
+#: Share of an FRF below which its noise counts as none.
 _NO_NOISE = 1e-9
-#: Values from which on cells of a map are shaded, and of the darkest unless some are larger.
+#: Value above which a cell of a map is shaded, and value of the darkest cell unless some are larger.
 _LIGHT, _DARK = 1.0, 10.0
-#: Agreement from which on a cell is shaded, and that of the darkest.
+#: Agreement below which a cell is shaded, and agreement of the darkest cell.
 _AGREES, _DIFFERS = 0.95, 0.6
-#: Parts of the band in the map of the residual, and lines that each holds at least.
+#: Number of parts of the band in the map of the residual, and least number of lines of a part.
 _PARTS, _LEAST_LINES = 8, 8
-#: An FRF has signal where its mean square is above so many times that of its noise, which has 1; lines that are asked.
+#: Mean square over the noise variance above which an FRF has signal, and number of lines that are tested.
 _SIGNAL, _ASKED = 2.0, 200
 #: Share of the differences that may lie below a panel.
 _LOWEST = 0.05
@@ -38,27 +38,28 @@ _LOWEST = 0.05
 
 @dataclass(frozen=True, eq=False)
 class ComparedFrfs:
-    """Measured and regenerated FRFs between channels, or between joint DOFs where channels have no rigid motion.
+    """Measured and regenerated FRFs between channels, or between joint DOFs if channels have no rigid motion.
 
     Attributes
     ----------
     rows, columns : tuple of str
         Names of responses and forces.
     of_channels : bool
+        Whether the FRFs are between channels.
     entries : tuple of (int, int)
-        FRFs that are drawn.
+        Rows and columns of the drawn FRFs.
     measured, regenerated : ndarray, shape (n_freq, n_entries)
-        m/N.
+        Drawn FRFs, m/N.
     residual : ndarray, shape (n_rows, n_columns)
-        Root mean square of measured minus regenerated, in units of the noise (of the FRF, or of rigid motion there if
-        that has more), over all lines in the bands, those that the fit left out, too.
+        Root mean square of measured minus regenerated FRFs over all lines in the bands, excluded lines included. The
+        unit is the noise of the FRF or of rigid motion, whichever is larger.
     reciprocity : ndarray, shape (n_rows, n_columns), or None
-        The same of h_pq - h_qp; NaN on the diagonal. None where rows and columns differ, or FRFs need not be
-        reciprocal.
+        Root mean square of h_pq - h_qp in units of the noise; NaN on the diagonal. None if rows and columns differ, or
+        if FRFs need not be reciprocal.
     predicted : str
-        What is compared with the measured FRFs.
+        Name of the FRFs that are compared with the measured ones.
     silent : int
-        FRFs that hold noise only, as those that are zero by symmetry: they are not drawn.
+        Number of FRFs with noise only, such as FRFs that are zero by symmetry; they are not drawn.
     """
 
     rows: tuple[str, ...]
@@ -74,18 +75,18 @@ class ComparedFrfs:
 
     @property
     def worst(self) -> int:
-        """The number of the drawn FRF that fits worst."""
+        """Number of the drawn FRF with the largest residual."""
         left = [self.residual[entry] for entry in self.entries]
         return int(np.argmax(np.where(np.isfinite(left), left, -1.0)))
 
 
 def compare_fit(fit: Fit) -> ComparedFrfs:
-    """Compare the FRFs of a fit with those that the joint found, with the models if there are any, predicts."""
+    """Compare the FRFs of a fit with the prediction of the fitted joint and, if there are any, the models."""
     return _compare_joint(fit.data, fit.dofs) if isinstance(fit.data, FitData) else _compare_model(fit)
 
 
 def _compare_joint(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
-    """Regenerate the FRFs of a fit, a piece of the lines at a time, and compare them with the measured ones."""
+    """Regenerate the FRFs of a fit in pieces of the lines, and compare them with the measured FRFs."""
     same = data.responses.shape == data.forces.shape and np.array_equal(data.responses, data.forces)
     modes = data.modes
     of_channels = modes is not None
@@ -106,12 +107,12 @@ def _compare_joint(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
             apart = variance
         else:
             regenerated = modes[0] @ regenerated @ modes[1].T
-            # Rigid motion at a channel carries the noise of the others, too.
+            # Rigid motion at a channel carries the noise of all channels.
             rigid = [(mode @ own) ** 2 for mode, own in zip(modes, (data.responses, data.forces), strict=True)]
             of_rigid = rigid[0] @ np.where(np.isfinite(variance), variance, 0) @ rigid[1].T
             apart = np.where(np.isfinite(variance), np.maximum(variance, of_rigid), np.inf)
         shown[0, own], shown[1, own] = h[:, p, q], regenerated[:, p, q]
-        # An FRF that is zero by symmetry says nothing, and has no noise of its own.
+        # An FRF that is zero by symmetry has no information, and no noise.
         is_there = abs(h) ** 2 > ZERO**2 * own_size(h) if same or modes is None else np.ones_like(h, bool)
         _add(squares[0], counts[0], abs(h - regenerated) ** 2, np.where(is_there, apart, 0))
         if same:
@@ -122,7 +123,7 @@ def _compare_joint(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
         residual, reciprocity = np.sqrt(squares / np.where(counts > 0, counts, np.nan))
     if same:
         np.fill_diagonal(reciprocity, np.nan)
-        # FRFs that were made reciprocal before say nothing.
+        # FRFs that were made reciprocal before have no information on reciprocity.
         same = bool((reciprocity > 0).any())
     is_shown = same and data.reciprocal
     return ComparedFrfs(
@@ -132,7 +133,7 @@ def _compare_joint(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
 
 
 def _is_loud(data: FitData, *, of_channels: bool) -> NDArray[np.bool_]:
-    """Return which FRFs hold more than noise, shape (n_rows, n_columns); all of them if none does."""
+    """Return which FRFs contain more than noise, shape (n_rows, n_columns), or all of them if none does."""
     asked = np.unique(np.linspace(0, len(data.measured) - 1, min(len(data.measured), _ASKED)).astype(np.intp))
     h, variance = data.measured[asked], np.stack([data.noise_variance(slice(i, i + 1))[0] for i in asked])
     if not of_channels:
@@ -141,16 +142,16 @@ def _is_loud(data: FitData, *, of_channels: bool) -> NDArray[np.bool_]:
 
 
 def _above_noise(squares: NDArray[np.floating], variance: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """Return which FRFs are larger than their noise; those that were measured if none is."""
+    """Return which FRFs are larger than their noise, or all measured FRFs if none is."""
     known = np.isfinite(squares) & np.isfinite(variance)
     signal, noise = (np.where(known, values, 0).sum(axis=0) for values in (squares, variance))
-    # Rounding is no signal, where nothing has noise.
+    # Without noise, rounding is no signal.
     loud = (signal > _SIGNAL * noise) & (signal > ZERO**2 * signal.max(initial=0.0))
     return np.asarray(loud if loud.any() else known.any(axis=0), np.bool_)
 
 
 def _compare_model(fit: Fit) -> ComparedFrfs:
-    """Compare the FRFs of a fit of an assembly with those that its models and the joint predict."""
+    """Compare the FRFs of a fit of an assembly with the prediction of its models and the joint."""
     data = fit.data
     assert isinstance(data, ModelData)
     known = np.isfinite(data.variance).any(axis=0)
@@ -172,7 +173,7 @@ def _compare_model(fit: Fit) -> ComparedFrfs:
 
 
 def _add(squares: FloatArray, counts: FloatArray, own: NDArray[np.floating], variance: FloatArray) -> None:
-    """Add squares in units of their variance where both are known."""
+    """Add squares in units of their variance if both are known."""
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = own / variance
     known = np.isfinite(ratio) & (variance > 0)
@@ -181,7 +182,7 @@ def _add(squares: FloatArray, counts: FloatArray, own: NDArray[np.floating], var
 
 
 def _entries(data: FitData, loud: NDArray[np.bool_], *, of_channels: bool, same: bool) -> tuple[tuple[int, int], ...]:
-    """Choose the FRFs to draw: at one channel, then across the joint, then the others; a spread of each where many."""
+    """Return the FRFs to draw: at one channel, across the joint, then other FRFs; evenly spread if there are many."""
     n, (n_rows, n_columns) = len(data.responses) // 2, loud.shape
     side_of_row, side_of_column = (
         list((matrix[n:] != 0).any(axis=0)) if of_channels else [i >= n for i in range(2 * n)]
@@ -199,13 +200,13 @@ def _entries(data: FitData, loud: NDArray[np.bool_], *, of_channels: bool, same:
 
 
 def _evenly(pairs: Sequence[tuple[int, int]], most: int) -> list[tuple[int, int]]:
-    """Choose pairs, evenly spread."""
+    """Return evenly spread pairs."""
     count = min(most, len(pairs))
     return [pairs[round(i * (len(pairs) - 1) / max(count - 1, 1))] for i in range(count)]
 
 
 def frf_figures(compared: ComparedFrfs, freq_hz: FloatArray) -> list[Figure]:
-    """Return modulus and phase of each FRF that is drawn."""
+    """Return figures of modulus and phase of the drawn FRFs."""
     figures, up = [], np.argsort(freq_hz, kind="stable")
     for i, (p, q) in enumerate(compared.entries):
         names = (compared.rows[p], compared.columns[q])
@@ -224,7 +225,7 @@ def frf_figures(compared: ComparedFrfs, freq_hz: FloatArray) -> list[Figure]:
 
 
 def _limits(curves: tuple[Curve, ...], difference: FloatArray) -> tuple[float, float] | None:
-    """Return limits along y that hold the FRFs, and of their difference all but its lowest part."""
+    """Return limits along y that contain the FRFs, and their difference except its lowest part."""
     values = np.concatenate([curve.y for curve in curves])
     values = values[np.isfinite(values) & (values > 0)]
     left = difference[np.isfinite(difference) & (difference > 0)]
@@ -235,7 +236,7 @@ def _limits(curves: tuple[Curve, ...], difference: FloatArray) -> tuple[float, f
 
 
 def frf_maps(fit: Fit, compared: ComparedFrfs) -> list[HeatMap]:
-    """Return maps by response and force: residual, and agreement or reciprocity where they are known."""
+    """Return maps by response and force: residual, and agreement or reciprocity if they are known."""
     if isinstance(fit.data, ModelData):
         return [assurance_map(fit), residual_map(compared), band_map(fit)]
     return [one for one in (residual_map(compared), reciprocity_map(compared)) if one]
@@ -249,7 +250,7 @@ def _map(compared: ComparedFrfs, key: str, title: str, values: FloatArray, note:
 
 
 def residual_map(compared: ComparedFrfs) -> HeatMap:
-    """Return the map of what is left by response and force."""
+    """Return the map of the residual by response and force."""
     where = "channel" if compared.of_channels else "joint DOF"
     if compared.predicted != "regenerated with the joint found":
         note = (
@@ -268,7 +269,7 @@ def residual_map(compared: ComparedFrfs) -> HeatMap:
 
 
 def reciprocity_map(compared: ComparedFrfs) -> HeatMap | None:
-    """Return the map of h_pq - h_qp, where there is one."""
+    """Return the map of h_pq - h_qp, or None if there is none."""
     if compared.reciprocity is None:
         return None
     note = (
@@ -284,13 +285,13 @@ def assurance(measured: ComplexArray, predicted: ComplexArray) -> FloatArray:
     Parameters
     ----------
     measured, predicted : ndarray, shape (n_freq, n_o, n_i)
-        NaN where nothing was measured.
+        Measured and predicted FRFs; NaN for entries that were not measured.
 
     Returns
     -------
     ndarray
         FRAC = |sum m conj(p)|^2 / (sum |m|^2 sum |p|^2) over the lines, from 0 to 1; a constant factor does not change
-        it. NaN where nothing was measured.
+        it. NaN for FRFs that were not measured.
 
     References
     ----------

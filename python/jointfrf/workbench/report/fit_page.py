@@ -1,4 +1,4 @@
-"""The page on one identification: what was found, from what, and how well it fits."""
+"""Page of one identification: results, data and goodness of fit."""
 
 from __future__ import annotations
 
@@ -53,26 +53,26 @@ from jointfrf.workbench.report.table import Table
 
 __all__ = ["ReportOptions", "fit_document", "write_report"]
 
-#: Points of all curves of a page together, each about nine bytes, and of a curve at least.
+#: Number of points of all curves of a page, each about nine bytes, and least number of points of a curve.
 _POINTS, _LEAST = 130_000, 240
-#: FRFs that are shown at once; the others when the reader asks for them.
+#: Number of FRFs that are shown without a click.
 _AT_ONCE = 6
-#: Sentences on parameters before the first figure.
+#: Number of sentences on parameters before the first figure.
 _FIRST_FOUND = 3
-#: Lines of cards that are printed at most.
+#: Largest number of lines of cards that are printed.
 _PRINTED = 40
-#: Relative changes of parameters that are shown at least.
+#: Least relative change of a parameter that is shown.
 _SHOWN_CHANGE = 1e-4
-#: Programs of cards as they call themselves.
+#: Names of programs of cards.
 _PROGRAMS = {"abaqus": "Abaqus", "calculix": "CalculiX", "nastran": "Nastran", "ansys": "Ansys",
              "code_aster": "Code_Aster", "lsdyna": "LS-DYNA", "subdyn": "SubDyn"}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class ReportOptions:
-    """What a report says beside the fit.
+    """Contents of a report in addition to the fit.
 
-    The file measured, the command typed, nodes j and k of cards, and parts drawn.
+    The measured file, the command, nodes j and k of cards, and the drawn parts.
     """
 
     source: str = ""
@@ -90,36 +90,43 @@ def write_report(
     nodes: Sequence[int] = (1, 2),
     parts: Sequence[SketchedPart] = (),
 ) -> Path:
-    """Write a page on a fit: one HTML file with all that is needed to judge and to quote the joint, no link to another.
+    """Write the page of a fit as one self-contained HTML file, and return its path.
 
     Parameters
     ----------
     fit : Fit
+        Result of `identify` or `identify_model`.
     path : Path or str
-        In a folder that exists.
+        Path of the file, in a folder that exists.
     source : str
-        Name of the file that was measured.
+        Name of the measured file, default empty.
     command : str
-        How the fit was made, as typed.
+        Command that made the fit, default empty.
     nodes : sequence of two or four int
-        Nodes j and k of the finite-element cards; then ROT NODEs of CalculiX.
+        Numbers of nodes j and k of the finite-element cards, then of ROT NODEs of CalculiX.
     parts : sequence of SketchedPart
-        All parts of an assembly with the places of their nodes, as `MeasuredAssembly.sketched`: they are drawn with
-        channels and joints.
+        Parts of an assembly with the places of their nodes, as in `MeasuredAssembly.sketched`, for a drawing with
+        channels and joints; default none.
 
     Returns
     -------
     Path
-        The file written.
+        Path of the written file.
 
     Raises
     ------
     ValueError
-        The fit does not hold the measured FRFs: it was loaded, or is a mean over bands.
+        The fit does not contain the measured FRFs, because it was loaded, or is a mean over bands.
     MissingPackageError
         jinja2 is missing.
     OSError
         The file cannot be written.
+
+    See Also
+    --------
+    plot : figure of the joint over frequency.
+    identify : fit of FRFs between joint DOFs.
+    identify_model : fit of FRFs with models of the parts.
     """
     check_type("fit", fit, Fit)
     check_type("parts", parts, Sequence)
@@ -134,7 +141,7 @@ def fit_document(fit: Fit, options: ReportOptions) -> Document:
     Raises
     ------
     ValueError
-        The fit does not hold the measured FRFs.
+        The fit does not contain the measured FRFs.
     """
     data = fit.data
     if data is None:
@@ -202,7 +209,7 @@ def _span(freq_hz: FloatArray) -> str:
 
 
 def _summary(fit: Fit, compared: ComparedFrfs, first: Part) -> Section:
-    """Begin with the worst warning and the first figure: both are on the first screen of a phone."""
+    """Return the summary with the worst warning and the first figure on top, on the first screen of a phone."""
     known = compared.residual[np.isfinite(compared.residual)]
     of_channels = float(np.sqrt((known**2).mean())) if known.size else np.nan
     found = finding_sentences(fit)
@@ -215,7 +222,7 @@ def _summary(fit: Fit, compared: ComparedFrfs, first: Part) -> Section:
 
 
 def _channels(fit: Fit, options: ReportOptions) -> Section:
-    """Return where was measured and driven: a sketch if places are known, and a table."""
+    """Return the places of responses and forces: a sketch if places are known, and a table."""
     data, (responses, forces) = fit.data, _channel_names(fit)
     if isinstance(data, ModelData):
         attached = [name for one in data.assembly.attachments for name in one.names[:1]]
@@ -243,12 +250,12 @@ def _channels(fit: Fit, options: ReportOptions) -> Section:
 
 
 def _pairs(key: str, title: str, rows: Sequence[tuple[str, str]]) -> Table:
-    """Return a table of what is known, without rows that are empty."""
+    """Return a table of names and values without empty rows."""
     return Table(key, title, ("what", "which"), tuple(row for row in rows if row[1]))
 
 
 def _how_joint(fit: Fit) -> str:
-    """Return what is said above the charts of the joint."""
+    """Return the text above the charts of the joint."""
     found = "found, from all frequency lines together; the shaded band is the 95 % interval of"
     zoom = "Drag across a chart to zoom in, double-click for the whole band"
     if isinstance(fit.data, ModelData):
@@ -308,7 +315,7 @@ def _noise_figure(fit: Fit) -> Figure | None:
 
 
 def _blind_spots(fit: Fit) -> Section:
-    """Say which errors of a test no FRF shows: no interval holds them."""
+    """Return the errors of a test that no FRF shows and no interval contains."""
     data, (responses, forces) = fit.data, _channel_names(fit)
     assert data is not None
     is_square = responses == forces and (isinstance(data, ModelData) or data.reciprocal)
@@ -330,7 +337,7 @@ def _blind_spots(fit: Fit) -> Section:
     known = data.hidden_errors() if isinstance(data, FitData) else {}
 
     def changes(name: str, size: str) -> str:
-        """Return a sentence on the effect of an error of some size, where that is known."""
+        """Return a sentence on the effect of an error of some size if it is known."""
         if name not in known:
             return ""
         shares = [
@@ -354,11 +361,11 @@ def _blind_spots(fit: Fit) -> Section:
         "(position_error): an error of 1 mm between two points changes the rotation between them by 1 mm over their "
         f"distance.{changes('position', '1 mm at each point')}",
     ]
-    return Section("blind", "What this test cannot know", [Words([seen, *others])])
+    return Section("blind", "Errors that this test cannot show", [Words([seen, *others])])
 
 
 def _cards(fit: Fit, nodes: Sequence[int]) -> list[Part]:
-    """Return the joint as input of each program, or why there is none."""
+    """Return the joint as input of each program, or the reason why there is none."""
     j, k = nodes[:2]
     listings, unsupported = [], []
     changes = fit.laws is not None and any(law.constant_terms is None for law in fit.laws.laws.values())
@@ -367,7 +374,7 @@ def _cards(fit: Fit, nodes: Sequence[int]) -> list[Part]:
     for program in get_args(CardFormat):
         is_calculix = program == "calculix"
         rotation = (tuple(nodes[2:4]) or (max(j, k) + 1, max(j, k) + 2)) if is_calculix else ()
-        # Nodes of the next joint point follow those of this one.
+        # Nodes of the next joint point follow the nodes of this point.
         ends = {point: (*own, *(node + 4 * i for node in rotation)) for i, (point, own) in enumerate(of_points.items())}
         name = _PROGRAMS[program] + (" (stiffness only)" if is_calculix else "")
         try:
@@ -393,7 +400,7 @@ def _cards(fit: Fit, nodes: Sequence[int]) -> list[Part]:
 
 
 def _made(fit: Fit, options: ReportOptions) -> Table:
-    """Return what is needed to get the same again."""
+    """Return the data that reproduce the fit."""
     import scipy
 
     epoch = os.environ.get("SOURCE_DATE_EPOCH")

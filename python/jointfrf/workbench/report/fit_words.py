@@ -1,4 +1,4 @@
-"""What a fit has found and what to measure next, in sentences that can be quoted, and as tables."""
+"""Results of a fit and recommended measurements, as sentences and tables."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from jointfrf.workbench.report.table import Cell, Table
 __all__ = ["finding_sentences", "is_wide", "next_parts", "next_sentences", "parameter_table", "quality_sentences",
            "seen_table", "unknowns_table"]  # fmt: skip
 
-#: An interval whose half is more than this share of a value is wide: designers ask for a stiffness to 10 %.
+#: Half width of an interval over the value above which it is wide: designers need a stiffness to 10 %.
 _WIDE = 0.1
-#: Unknowns have moved from this many standard deviations of the prior on; the FRFs say little of one whose standard
-#: deviation they leave above this share.
+#: Change of an unknown in standard deviations of the prior above which it has moved, and ratio of its standard
+#: deviation to the prior above which the FRFs contain little information on it.
 _MOVED, _UNCHANGED = 1.0, 0.9
-#: Channels that are named, and shares that are printed alike.
+#: Largest number of named channels, and difference below which shares are equal.
 _NAMED, _SAME = 3, 0.01
-#: A residual up to this many times the noise is called that of the noise.
+#: Residual over the noise up to which it counts as noise.
 _NOISE = 1.1
 #: Significant digits of an uncertainty.
 _DIGITS = 2
-#: Of all intervals of the page.
+#: Coverage probability of all intervals of the page.
 _PROBABILITY = 0.95
 
 
 def with_unit(value: float, unit: str, uncertainty: float | None = None) -> str:
-    """Write a value with its unit and prefix, to two digits of its uncertainty, four digits without one.
+    """Return a value with its unit and prefix, to two digits of its uncertainty, or to four digits without one.
 
     Examples
     --------
@@ -54,7 +54,7 @@ def _rounded(value: float, uncertainty: float | None) -> str:
 
 
 def _named(term: FittedParameter) -> str:
-    """Name a parameter of one DOF in words."""
+    """Return the name of a parameter of one DOF in words."""
     kind = {"k": "stiffness", "h": "hysteretic stiffness", "c": "viscous damping"}.get(term.kind)
     if kind is None:
         return f"parameter {term.kind} of {term.row}"
@@ -66,7 +66,7 @@ def _named(term: FittedParameter) -> str:
 
 
 def finding_sentences(fit: Fit) -> list[str]:
-    """Return one sentence a parameter, its value and where it lies with 95 % probability; one for all cross terms."""
+    """Return a sentence for each parameter with its value and 95 % interval, and one sentence for all cross terms."""
     intervals = fit.confidence_interval(_PROBABILITY)
     sentences = [] if fit.laws is None or not fit.laws.rigid else [f"Rigid: {', '.join(fit.laws.rigid)}."]
     for term, value in zip(fit.parameters, fit.value.values(), strict=True):
@@ -112,11 +112,12 @@ def _value_sentence(term: FittedParameter, value: float, low: float, high: float
 
 
 def quality_sentences(fit: Fit, of_channels: float = np.nan) -> list[str]:
-    """Return sentences on noise and residual, and on lines that were left out.
+    """Return sentences on noise, residual and excluded lines.
 
     Parameters
     ----------
     fit : Fit
+        Result of `identify` or `identify_model`.
     of_channels : float
         Residual between the channels over the noise, root mean square over all lines of the band and all FRFs.
     """
@@ -152,7 +153,7 @@ def quality_sentences(fit: Fit, of_channels: float = np.nan) -> list[str]:
 
 
 def _elsewhere(of_fitted: float, whole: float, of_channels: float) -> str:
-    """Say what residuals beside that of the lines fitted are, where they are larger."""
+    """Return a sentence on larger residuals of all lines or of the channels."""
     found = ""
     if whole > _NOISE * of_fitted:
         found += f"; with the lines left out it is {whole:.3g} times the noise"
@@ -193,7 +194,7 @@ def parameter_table(fit: Fit) -> Table:
 
 
 def seen_table(fit: Fit) -> Table:
-    """Return the stiffness as seen between virtual points, and what makes the interval of the joint alone wide."""
+    """Return the stiffness between virtual points, and the contributions to the interval of the joint alone."""
     rows: list[tuple[Cell, ...]] = []
     for term in fit.parameters:
         one = fit.seen.get(term.name)
@@ -210,7 +211,7 @@ def seen_table(fit: Fit) -> Table:
 
 
 def unknowns_table(fit: Fit) -> Table | None:
-    """Return what the FRFs say of the unknowns beside the joint that have a prior; None where there are none."""
+    """Return a table of unknowns with a prior outside the joint, before and after the fit, or None without any."""
     errors, rows = fit.std_error, list[tuple[Cell, ...]]()
     for one in fit.parameters:
         if one.origin == "joint" or one.prior is None:
@@ -238,7 +239,7 @@ def is_wide(fit: Fit) -> bool:
 
 
 def next_sentences(fit: Fit) -> list[str]:
-    """Say what to measure next where intervals of the joint are wide; nothing where they are not."""
+    """Return recommended measurements for wide intervals of the joint; empty if no interval is wide."""
     data = fit.data
     if not isinstance(data, ModelData) or not is_wide(fit):
         return []
@@ -250,7 +251,7 @@ def next_sentences(fit: Fit) -> list[str]:
     for one in found:
         of_dof.setdefault(one.dof, []).append(one)
     for dof, (one, *others) in list(of_dof.items())[:_NAMED]:
-        # FRFs of one drive point are reciprocal: a sensor or a force there give the same.
+        # FRFs of one drive point are reciprocal: a sensor or a force there gives the same information.
         is_either = bool(others) and all(
             abs(others[0].shares[key] - share) < _SAME for key, share in one.shares.items()
         )
@@ -265,7 +266,7 @@ def next_sentences(fit: Fit) -> list[str]:
 
 
 def next_parts(fit: Fit) -> list[Part]:
-    """Return what to measure next, where that is asked."""
+    """Return the parts of the page with recommended measurements."""
     sentences = next_sentences(fit)
     if not sentences:
         return []

@@ -1,4 +1,4 @@
-"""A joint at several levels, looked at: stiffness and loss factor over amplitude, tables, a page."""
+"""Page of a joint at several levels: stiffness and loss factor over amplitude, and tables."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def levels_figure(found: JointLevels, dof: str) -> Figure:
 def _panel(
     x_label: str, y_label: str, x: FloatArray, limits: Sequence[FloatArray], interval: str, *law: Curve
 ) -> Panel:
-    """Draw low, value and high over an amplitude, in any order of the values."""
+    """Return a panel of low, value and high over an amplitude, in any order of the values."""
     order = np.argsort(x)
     low, value, high = (own[order] for own in limits)
     curves, ribbon = (
@@ -84,22 +84,23 @@ def modal_decay_figure(mode: ModalDecay) -> Figure:
 
 
 def write_levels(found: JointLevels, path: Path | str, *, command: str = "", modes: Sequence[ModalDecay] = ()) -> Path:
-    """Write a page on a joint at several levels: one HTML file, no link to another.
+    """Write the page of a joint at several levels as one self-contained HTML file, and return its path.
 
     Parameters
     ----------
     found : JointLevels
+        Result of `levels`, `backbone_levels` or `decay_levels`.
     path : Path or str
-        In a folder that exists.
+        Path of the file, in a folder that exists.
     command : str
-        How it was made, as typed.
+        Command that made the levels, default empty.
     modes : sequence of ModalDecay
-        Free decays that the levels come from; default none.
+        Free decays from which the levels come; default none.
 
     Returns
     -------
     Path
-        The file written.
+        Path of the written file.
 
     Raises
     ------
@@ -107,6 +108,11 @@ def write_levels(found: JointLevels, path: Path | str, *, command: str = "", mod
         jinja2 or matplotlib is missing.
     OSError
         The file cannot be written.
+
+    See Also
+    --------
+    levels : stiffness and loss factor from fits at several levels.
+    decay_levels : stiffness and loss factor from free decays.
     """
     check_type("found", found, JointLevels)
     figures = [*map(modal_decay_figure, modes), *(levels_figure(found, dof) for dof in found.levels)]
@@ -168,7 +174,7 @@ def _row(one: JointLevel) -> tuple[str | float, ...]:
 
 
 def levels_csv(found: JointLevels) -> str:
-    """Write a line for each level of each DOF: a table of secant stiffness and loss factor."""
+    """Return a CSV table of secant stiffness and loss factor, with a line for each level of each DOF."""
     columns = ("dof", "test", "amplitude", "lowest", "highest", "force", "k", "k_low", "k_high", "loss_factor",
                "loss_factor_low", "loss_factor_high", "order")  # fmt: skip
     return csv_text([columns, *((dof, *_row(one)) for dof, own in found.levels.items() for one in own)])

@@ -1,4 +1,4 @@
-"""A planned test, looked at: where sensors and hits go, what each adds, and where in frequency the knowledge lies."""
+"""Page of a planned test: places of sensors and impacts, their contributions, and information over frequency."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from jointfrf.workbench.report.table import Cell, Table
 
 __all__ = ["cost_figure", "line_figure", "write_plan"]
 
-#: Candidates whose shares are shown one by one; a map of more is no longer read.
+#: Largest number of candidates in a map of shares.
 _MOST_CELLS = 40
 
 
 def cost_figure(plan: MeasurementPlan) -> Figure:
-    """Return the error over what is spent."""
+    """Return a figure of the error over the cost."""
     cost, error = np.array([(one.cost, 100 * one.error) for one in plan.steps]).T
     panel = Panel(
         "", "cost of sensors and hits", "relative error, %", (Curve("plan", cost, error, "ismm-points"),),
@@ -42,7 +42,7 @@ def cost_figure(plan: MeasurementPlan) -> Figure:
 
 
 def line_figure(plan: MeasurementPlan | JointFrfPlan) -> Figure:
-    """Return what each line knows of each target."""
+    """Return a figure of the information of each line on each target."""
     width = np.gradient(plan.freq_hz) if plan.freq_hz.size > 1 else np.ones(1)
     panels = list[Panel]()
     for name, share in zip(plan.bands, plan.line_share, strict=True):
@@ -58,22 +58,23 @@ def line_figure(plan: MeasurementPlan | JointFrfPlan) -> Figure:
 def write_plan(
     plan: MeasurementPlan | JointFrfPlan, path: Path | str, *, parts: Sequence[SketchedPart] = (), command: str = ""
 ) -> Path:
-    """Write a page on a planned test: one HTML file, no link to another.
+    """Write the page of a planned test as one self-contained HTML file, and return its path.
 
     Parameters
     ----------
     plan : MeasurementPlan or JointFrfPlan
+        Result of `plan` or `plan_joint_frfs`.
     path : Path or str
-        In a folder that exists.
+        Path of the file, in a folder that exists.
     parts : sequence of SketchedPart
-        Where the nodes of all parts are, for a drawing of joints, sensors and hits.
+        Parts with the places of their nodes, for a drawing of joints, sensors and impacts; default none.
     command : str
-        How it was made, as typed.
+        Command that made the plan, default empty.
 
     Returns
     -------
     Path
-        The file written.
+        Path of the written file.
 
     Raises
     ------
@@ -81,6 +82,11 @@ def write_plan(
         jinja2 or matplotlib is missing.
     OSError
         The file cannot be written.
+
+    See Also
+    --------
+    plan : choice of sensors and impacts.
+    plan_joint_frfs : expected errors from FRFs between all joint DOFs.
     """
     if not isinstance(plan, MeasurementPlan | JointFrfPlan):
         raise TypeError(f"plan must be a MeasurementPlan or a JointFrfPlan, not {type(plan).__name__}")
@@ -162,7 +168,7 @@ def _additions(plan: MeasurementPlan) -> Table:
 def _shares(
     targets: Sequence[str], rows: Sequence[str], columns: Sequence[str], shares: FloatArray, of_what: str
 ) -> Iterator[Part]:
-    """Yield maps of FRFs: the share of each in what all together know."""
+    """Yield maps of the share of each FRF in the information of all."""
     if max(len(rows), len(columns)) > _MOST_CELLS:
         return
     for name, share in zip(targets, shares, strict=True):

@@ -1,4 +1,4 @@
-"""Pooled fits of one joint, looked at: a forest plot of each parameter, tables, a page."""
+"""Page of pooled fits of one joint: a forest plot of each parameter, and tables."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from jointfrf.workbench.report.table import Table, csv_text, without_repeats
 __all__ = ["forest_figure", "pool_csv", "write_pool"]
 
 
-#: Fits that are named above the page; the plots name all.
+#: Largest number of fits in the heading of the page; the plots name all.
 _NAMED = 6
 
 
 def forest_figure(one: PooledParameter, probability: float = 0.95) -> Figure:
-    """Return the forest plot of a parameter: each fit, the mean, and where the next assembly lies."""
+    """Return the forest plot of a parameter: each fit, the mean, and the interval of the next assembly."""
     percent = f"{100 * probability:g} %"
     rows = [
         *zip(one.labels, one.estimates, strict=True),
@@ -50,20 +50,21 @@ def _row_name(label: str, one: PooledParameter) -> str:
 
 
 def write_pool(pooled: PooledFits, path: Path | str, *, command: str = "") -> Path:
-    """Write a page on pooled fits: one HTML file, no link to another.
+    """Write the page of pooled fits as one self-contained HTML file, and return its path.
 
     Parameters
     ----------
     pooled : PooledFits
+        Result of `pool`.
     path : Path or str
-        In a folder that exists.
+        Path of the file, in a folder that exists.
     command : str
-        How it was made, as typed.
+        Command that pooled the fits, default empty.
 
     Returns
     -------
     Path
-        The file written.
+        Path of the written file.
 
     Raises
     ------
@@ -71,6 +72,10 @@ def write_pool(pooled: PooledFits, path: Path | str, *, command: str = "") -> Pa
         jinja2 or matplotlib is missing.
     OSError
         The file cannot be written.
+
+    See Also
+    --------
+    pool : mean and spread of a joint over several fits.
     """
     check_type("pooled", pooled, PooledFits)
     return write_document(_document(pooled, command), path)
@@ -136,7 +141,7 @@ def _trend_table(pooled: PooledFits) -> Table:
 
 
 def pool_csv(pooled: PooledFits) -> str:
-    """Write a line for each fit, the mean, the next assembly, spreads and trends of each parameter."""
+    """Return a CSV table with a line for each fit, mean, next assembly, spread and trend of each parameter."""
     rows: list[tuple[object, ...]] = [("parameter", "unit", "what", "of", "value", "low", "high", "p")]
     for one in pooled.parameters.values():
         lines: list[tuple[str, str, Estimate | FactorSpread | FactorTrend, object]] = [

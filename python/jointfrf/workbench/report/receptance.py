@@ -1,4 +1,4 @@
-"""FRFs over frequency: modulus and phase below each other, and the noise found in them."""
+"""FRFs over frequency: modulus and phase below each other, and their estimated noise."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ __all__ = [
 
 #: Label of the axis.
 PHASE = "phase, deg"
-#: Between these lie the phases of a passive structure where response and force are at the same DOF; else the others.
+#: Range of the phases of a passive structure with response and force at the same DOF, and range of other phases.
 _DRIVING, _ALL = (-200.0, 20.0), (-280.0, 100.0)
-#: Distance of the numbers along a phase.
+#: Distance of the numbers along the axis of a phase.
 _QUARTER = 90.0
-#: Heights of modulus and phase, and how far they shrink where more than so many are below each other.
+#: Heights of modulus and phase; their scale if there are many rows, and the number of rows above which it applies.
 _HEIGHTS, _SHRUNK, _MOST = (0.85, 0.5), 0.8, 2
 
 
@@ -44,7 +44,7 @@ class ReceptanceCurve(NamedTuple):
 
 
 def phase_degrees(h: ComplexArray) -> FloatArray:
-    """Phase between -270 and 90 degrees: noise about -180, beyond a resonance, makes no jumps.
+    """Return the phase between -270 and 90 degrees, without jumps by noise about -180 beyond a resonance.
 
     Examples
     --------
@@ -59,20 +59,23 @@ def phase_degrees(h: ComplexArray) -> FloatArray:
 def receptance_panels(
     title: str, label: str, curves: Sequence[ReceptanceCurve], ribbons: tuple[Ribbon, ...] = (), shades: NamedBands = ()
 ) -> tuple[Panel, Panel]:
-    """Draw the modulus of receptances and, below it on the same lines, their phase.
+    """Return panels of the modulus of receptances and of their phase below it.
 
     Parameters
     ----------
     title, label : str
-        Of the modulus.
+        Title and label of the axis of the modulus.
     curves : sequence of ReceptanceCurve
+        Receptances.
     ribbons : tuple of Ribbon
         Areas of the modulus.
     shades : tuple of (label, bands)
+        Shaded bands, Hz.
 
     Returns
     -------
     modulus, phase : Panel
+        Panels with the same lines.
     """
     moduli = tuple(Curve(one.label, one.freq_hz, np.abs(one.h), one.style) for one in curves)
     phases = tuple(Curve(one.label, one.freq_hz, phase_degrees(one.h), one.style) for one in curves)
@@ -87,7 +90,7 @@ def receptance_panels(
 
 
 def side_by_side(pairs: Sequence[tuple[Panel, Panel]], columns: int) -> tuple[Panel, ...]:
-    """Arrange moduli in rows, each with a row of its phases below."""
+    """Return panels in rows: a row of moduli, and a row of their phases below."""
     arranged: list[Panel] = []
     shrink = _SHRUNK if len(pairs) > _MOST * columns else 1.0
     for first in range(0, len(pairs), columns):
@@ -97,13 +100,13 @@ def side_by_side(pairs: Sequence[tuple[Panel, Panel]], columns: int) -> tuple[Pa
     return tuple(arranged)
 
 
-#: FRFs that still fit on a page.
+#: Largest number of FRFs on a page.
 _MOST_PANELS = 6
-#: A part of the noise below this share of all is not drawn.
+#: Share of the noise below which a part is not drawn.
 _LEAST = 0.02
-#: Noise of neighbouring lines is called correlated from this on.
+#: Correlation of the noise of neighbouring lines above which it is reported.
 _CORRELATED = 1.2
-#: Decades below the smallest quarter of the noise that a panel reaches.
+#: Decades of a panel below the first quartile of the noise.
 _BELOW = 1.0
 
 
@@ -116,25 +119,25 @@ def noise_figure(
     *,
     entries: Sequence[tuple[int, int]] = (),
 ) -> Figure:
-    """Draw FRFs with their smooth ones, the noise found in them by its parts, and outlying lines.
+    """Return a figure of FRFs, smooth FRFs, the parts of their estimated noise, and outlying lines.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Lines, Hz.
     h : ndarray, shape (n_freq, n_out, n_in)
         Measured receptances.
     noise : NoiseModel
-        What `estimate_noise` found in them.
+        Noise of the FRFs from `estimate_noise`.
     responses, forces : sequence of str
         Names of the channels; their directions give the units.
     entries : sequence of (int, int)
-        Which FRFs to draw; by default the first in each row whose noise is known, six at most.
+        Rows and columns of the FRFs to draw, default the first FRF in each row whose noise is known, at most six.
 
     Returns
     -------
     Figure
-        ``"noise_found"``.
+        Figure with the key ``"noise_found"``.
     """
     known = (noise.relative > 0) | (noise.floor > 0) | (noise.coherence_factor > 0)
     if not entries:
@@ -161,19 +164,20 @@ def _caption(noise: NoiseModel) -> str:
 def noise_panel(
     freq_hz: FloatArray, h: ComplexArray, noise: NoiseModel, entry: tuple[int, int], names: tuple[str, str]
 ) -> Panel:
-    """Draw one FRF: moduli as measured and smooth, standard deviation of the noise and of its parts.
+    """Return a panel of one FRF: measured and smooth modulus, standard deviation of the noise and of its parts.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz, in any order.
+        Lines, Hz, in any order.
     h : ndarray, shape (n_freq,)
-        As measured.
+        Measured receptance.
     noise : NoiseModel
+        Noise of all FRFs.
     entry : (int, int)
-        Its place among the FRFs.
+        Row and column of the FRF.
     names : (str, str)
-        Of response and force.
+        Names of response and force.
     """
     up = np.argsort(freq_hz)
     at = (slice(None), *entry)

@@ -1,4 +1,4 @@
-"""Sketches: the channels around a joint and what it acts between; the parts of an assembly, its sensors and hits."""
+"""Sketches of the channels around a joint, and of the parts of an assembly with sensors and impacts."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ __all__ = [
 _VIEW = np.array([[0.87, -0.32], [0.0, 0.95], [0.5, 0.42]]).T
 #: Width of the drawing, least and largest height, margin, and size of arrows.
 _WIDTH, _LOW, _HIGH, _MARGIN, _ARROW = 760.0, 170.0, 340.0, 62.0, 34.0
-#: Where the axes of space begin, from the left and from below, and how long they are.
+#: Origin of the axes of space, from the left and from below, and their length.
 _CORNER, _AXIS = (34.0, 34.0), 26.0
-#: Letters as large as on a phone, and their width in heights: names that do not overprint there do not elsewhere.
+#: Size of letters on a phone, and their width in heights: names that do not overlap there do not overlap elsewhere.
 _FONT, _LETTER = 17.0, 0.58
-#: Where a name may stand about its place, and how far away.
+#: Possible directions of a name from its place, and distances.
 _AROUND = ((1, -1), (-1, -1), (1, 1), (-1, 1), (0, 1), (0, -1), (1, 0), (-1, 0))
 _DISTANCES = (8.0, 22.0, 40.0, 60.0)
 #: A spring from (0, 0) to (1, 0), six turns high.
@@ -42,26 +42,26 @@ _HEADS = "".join(
     f'refY="3.2" stroke="none"><path class="{style}" stroke="none" d="M0 0L8 3.2 0 6.4z"/></marker>'
     for style in ("j", "k", "axis")
 )
-#: How far parts are drawn apart where they meet, each way.
+#: Distance by which each part is drawn away from its joints.
 _LIFT = 9.0
-#: Nodes of a part that are drawn at most: more are a grey body.
+#: Largest number of nodes of a part that are drawn; more become a grey body.
 _MOST_NODES = 400
-#: Points nearer than this share of the extent count as one place.
+#: Share of the extent below which points are one place.
 _SAME = 1e-6
-#: Directions that differ by less are one.
+#: Difference below which directions are equal.
 _PARALLEL = 1e-6
-#: Directions whose triple product is above this determine a place.
+#: Triple product above which directions determine a place.
 _INDEPENDENT = 0.1
-#: Sides whose points are nearer on the page are drawn so far apart, each way.
+#: Distance of points on the page below which sides are drawn apart by this distance, each way.
 _APART = 30.0
 
 
-#: Left, top, right and bottom of what is drawn already.
+#: Left, top, right and bottom of a box on the page.
 _Box = tuple[float, float, float, float]
 
 
 class InterfacePoint(NamedTuple):
-    """A measured point: name, side 0 (j) or 1 (k), place in m, directions of its channels, what is known of x, y, z.
+    """A measured point: name, side 0 (j) or 1 (k), place in m, directions of channels, and whether x, y, z are known.
 
     The direction of a channel that measures a rotation is zero; `axes` has its axis.
     """
@@ -79,9 +79,9 @@ def interface_points(interface: Interface) -> list[InterfacePoint]:
 
     Notes
     -----
-    A channel along d at r from the reference point moves by r x d for a unit rotation: one direction determines all
-    of r but its part along d, which is taken as zero. Channels without names are points of their own, by their
-    numbers; three in a row that can be at one place, as those of a sensor of three axes, are one.
+    A channel along d at r from the reference point moves by r x d for a unit rotation: one direction determines r
+    except its component along d, which is taken as zero. Each channel without a name is a separate point with its
+    number as a name. Three successive ones that can be at one place, such as a sensor of three axes, are one point.
     """
     points = []
     for name, own in _rows_of_points(interface):
@@ -96,9 +96,9 @@ def interface_points(interface: Interface) -> list[InterfacePoint]:
 
 
 def _place(motion: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Return where channels are that move so with their reference point.
+    """Return the place of channels from their motion with the reference point.
 
-    Then the directions along which nothing states where they are, shape (n, 3), and by how much the motion departs.
+    Then the directions along which the place is unknown, shape (n, 3), and the residual of the motion.
     """
     # r x d is linear in r: the sum of r_a times e_a x d.
     moves = motion[:, :3].any(axis=1)
@@ -160,7 +160,7 @@ def _axis(direction: FloatArray, axis: FloatArray) -> str:
 
 
 class _Scene:
-    """A sketch in the making: what is drawn, which places are taken, and the names that are still to be written."""
+    """Unfinished sketch: drawn elements, occupied places, and names that are not yet written."""
 
     def __init__(self, places: FloatArray, view: FloatArray = _VIEW) -> None:
         flat = places @ view.T
@@ -175,7 +175,7 @@ class _Scene:
         self.taken: list[_Box] = [(0.0, self.corner[1] - 1.6 * _AXIS, self.corner[0] + 1.6 * _AXIS, self.height)]
 
     def at(self, place: FloatArray, down: float = 0.0) -> FloatArray:
-        """Return the spot on the page of a place in space, drawn so much lower."""
+        """Return the spot on the page of a place in space, moved down by a distance."""
         right, up = (place @ self.view.T - self.middle) * self.scale
         return np.array([_WIDTH / 2 + right, self.height / 2 - up + down])
 
@@ -223,7 +223,7 @@ class _Scene:
         return Sketch(key, svg, caption, alt)
 
     def _write(self, name: str, spot: FloatArray) -> bool:
-        """Write a name beside its spot where it overprints nothing; return whether there is such a place."""
+        """Write a name next to its spot without overlap, and return whether there is such a place."""
         x, y = spot.tolist()
         half_width, half_height = _FONT * _LETTER * len(name) / 2, _FONT / 2
         for distance, (right, down) in ((d, way) for d in _DISTANCES for way in _AROUND):
@@ -253,7 +253,7 @@ def interface_sketch(interface: Interface, points: list[InterfacePoint], dofs: t
     """Draw the points of both sides with their directions, and the joint between the reference points."""
     scene, side_of = _Scene(np.array([p.place for p in points] + list(interface.references))), [p.side for p in points]
     flat, side = np.array([scene.at(p.place) for p in points]), np.array(side_of)
-    # Sides that lie on each other are drawn apart.
+    # Sides on top of each other are drawn apart.
     between = np.linalg.norm(flat[side == 0][:, None] - flat[side == 1][None], axis=2)
     shift = _APART if between.min(initial=np.inf) < _APART else 0.0
     spots = flat + np.stack([np.zeros(side.size), shift * (2 * side - 1)], axis=1)
@@ -284,14 +284,14 @@ def interface_sketch(interface: Interface, points: list[InterfacePoint], dofs: t
 
 
 class SketchedPart(NamedTuple):
-    """A part of an assembly: its name, where its nodes are, m, in axes of its own, and which are at which joint."""
+    """A part of an assembly: its name, places of its nodes in its own axes, m, and its nodes by joint."""
 
     letter: str
     places: Mapping[str, FloatArray]
     joints: Mapping[str, Sequence[str]]
 
     def ends(self) -> dict[str, FloatArray]:
-        """Return where it has each joint, m, as far as that is known."""
+        """Return the place of each joint on the part, m, if it is known."""
         known = {
             name: [self.places[node] for node in nodes if node in self.places] for name, nodes in self.joints.items()
         }
@@ -301,10 +301,9 @@ class SketchedPart(NamedTuple):
 def _moved_parts(
     parts: Sequence[SketchedPart],
 ) -> tuple[list[dict[str, FloatArray]], dict[str, dict[int, FloatArray]]] | None:
-    """Return places of nodes with all parts where they meet, and the ends of joints, m; None where a part meets none.
+    """Return places of nodes of assembled parts, and the ends of joints, m, or None if a part has no joint.
 
-    The first part stays where it is. One after the other the rest follows, each to where its joints with those before
-    it lie in the mean on theirs.
+    The first part is fixed. Each further part is moved so that its joints with earlier parts coincide in the mean.
     """
     ends = [part.ends() for part in parts]
     shift: dict[int, FloatArray] = {0: np.zeros(3)}
@@ -327,7 +326,7 @@ def _moved_parts(
 
 
 def _levels(count: int, joints: Mapping[str, Mapping[int, FloatArray]]) -> list[int]:
-    """Return how many joints lead from the first part to each: neighbours are drawn apart, and in other colours."""
+    """Return the number of joints from the first part to each: neighbours are drawn apart, and in other colours."""
     levels = {0: 0}
     while len(levels) < count:
         level = max(levels.values()) + 1
@@ -337,14 +336,14 @@ def _levels(count: int, joints: Mapping[str, Mapping[int, FloatArray]]) -> list[
 
 
 def assembly_sketch(parts: Sequence[SketchedPart], sensors: Sequence[str], hits: Sequence[str]) -> Sketch | None:
-    """Draw the parts of an assembly and its joints, sensors and hits; None where places of nodes are not known.
+    """Return a sketch of an assembly with joints, sensors and impacts, or None if places of nodes are unknown.
 
     Parameters
     ----------
     parts : sequence of SketchedPart
-        All but the first are moved to where their nodes at joints lie on those of others.
+        Parts of the assembly. All except the first are moved so that nodes at joints coincide.
     sensors, hits : sequence of str
-        DOFs ``"A/7:y"``.
+        DOFs ``"A/7:y"`` of sensors and impacts.
     """
     placed = _moved_parts(parts)
     if placed is None:
@@ -401,13 +400,13 @@ def assembly_sketch(parts: Sequence[SketchedPart], sensors: Sequence[str], hits:
 
 
 def _view_along(axis: int) -> FloatArray:
-    """Return directions on the page of x, y and z, with one of them to the right: never a mirror image."""
+    """Return directions on the page of x, y and z, with one of them to the right, without a mirror image."""
     right, up, away = _VIEW.T
     return np.array([[right, up, away], [away, right, up], [-away, up, right]][axis]).T
 
 
 def _unit(direction: str) -> FloatArray:
-    """Return the unit vector of a direction such as ``y``; zeros where it is none in space."""
+    """Return the unit vector of a direction such as ``y``, or zeros if it is none in space."""
     try:
         name = direction_names([direction.lstrip("+-")])[0]
     except ValueError:

@@ -1,4 +1,4 @@
-"""Tables as data, and written: as aligned text, as CSV, and cell by cell for a reader; the verdict always first."""
+"""Tables as data, as aligned text, as CSV, and as formatted cells, with the verdict in the first column."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ Cell = str | float | Parameter | None
 VERDICT = "verdict"
 #: Significant digits of values and of percentages.
 _DIGITS, _DIGITS_OF_PERCENT = 5, 3
-#: Percentages below this are written as being below it: no measurement and no model is so exact.
+#: Percentage below which a cell shows only this limit: no measurement and no model is so exact.
 _LEAST_PERCENT = 1e-3
-#: What a formula of a spreadsheet begins with.
+#: First characters of a formula of a spreadsheet.
 _FORMULA = ("=", "+", "-", "@")
-#: Numbers with blanks between, which are none.
+#: Numbers with blanks between, which are no formula.
 _NUMBERS = re.compile(r"(?:[-+]?[\d.]++(?:e[-+]?\d++)? ?)++")
 
 
@@ -51,14 +51,18 @@ class Table:
     Attributes
     ----------
     key : str
-        Name of its file, and of its place on a page.
+        Name of the file of the table, and of its place on a page.
     title : str
+        Heading of the table.
     columns : tuple of str
-        "quantity, unit". One without a name holds verdicts: whatever shows the table begins with it, see `shown`.
+        Headings of the columns, "quantity, unit". A column without a name contains verdicts and is shown first, see
+        `shown`.
     rows : tuple of tuple
+        Cells by row.
     failing : tuple of int
-        Rows whose verdict is that something does not fit.
+        Numbers of rows with a negative verdict.
     note : str
+        Note below the table.
     percentages : tuple of str
         Columns that are written with three digits instead of five.
     """
@@ -73,12 +77,12 @@ class Table:
 
     @property
     def is_number(self) -> list[bool]:
-        """Which columns hold numbers."""
+        """Return for each column whether it contains numbers."""
         return [any(isinstance(row[c], float) for row in self.rows) for c in range(len(self.columns))]
 
 
 def shown(table: Table) -> Table:
-    """Return a table as it is shown: its verdicts, if it holds any, in the first column, which is named.
+    """Return a table with its verdicts, if any, in a named first column.
 
     Examples
     --------
@@ -99,7 +103,7 @@ def shown(table: Table) -> Table:
 
 
 def without_repeats(table: Table) -> Table:
-    """Return a table without percentiles that repeat their median, then without columns that hold nothing.
+    """Return a table without percentiles that repeat their median, and without empty columns.
 
     Examples
     --------
@@ -140,7 +144,7 @@ def turned(table: Table) -> Table:
 
 
 def number(value: Cell, digits: int = _DIGITS) -> str:
-    """Write a cell for a reader: `digits` significant digits, without an exponent where that is short."""
+    """Return the text of a cell with `digits` significant digits, without an exponent if it is short."""
     if value is None:
         return ""
     if isinstance(value, str | Parameter):
@@ -156,20 +160,20 @@ def number(value: Cell, digits: int = _DIGITS) -> str:
 
 
 def written(table: Table) -> list[list[str]]:
-    """Write the cells of a table for a reader: values with five digits, percentages with three."""
+    """Return the texts of the cells of a table: values with five digits, percentages with three."""
     digits = [_DIGITS_OF_PERCENT if column in table.percentages else _DIGITS for column in table.columns]
     return [[_written(cell, d) for cell, d in zip(row, digits, strict=True)] for row in table.rows]
 
 
 def _written(cell: Cell, digits: int) -> str:
-    """Write a cell; a percentage that nobody distinguishes from zero as one that is small."""
+    """Return the text of a cell, with a limit for a negligible percentage."""
     if digits == _DIGITS_OF_PERCENT and isinstance(cell, float) and 0 < abs(cell) < _LEAST_PERCENT:
         return f"{'< ' if cell > 0 else '> -'}{_LEAST_PERCENT:g}"
     return number(cell, digits)
 
 
 def as_text(table: Table) -> str:
-    """Write a table in aligned columns, numbers to the right."""
+    """Return a table in aligned columns, numbers to the right."""
     table = shown(table)
     cells = written(table)
     widths = [max(len(row[c]) for row in [list(table.columns), *cells]) for c in range(len(table.columns))]
@@ -187,7 +191,7 @@ def plain_rows(table: Table) -> list[list[str | float | None]]:
 
 
 def csv_cell(cell: object) -> object:
-    """Return a cell of a CSV file; a text that a spreadsheet would take for a formula follows an apostrophe.
+    """Return a cell of a CSV file, with an apostrophe before a text that a spreadsheet would take for a formula.
 
     Examples
     --------
@@ -202,19 +206,19 @@ def csv_cell(cell: object) -> object:
 
 @lru_cache(1000)
 def _csv_text(cell: str) -> str:
-    """Return a text of a cell: a curve has its name on every line."""
+    """Return the text of a cell; cached, because a curve has its name on every line."""
     text = visible(cell)
     return f"'{text}" if text.lstrip()[:1] in _FORMULA and not _NUMBERS.fullmatch(text) else text
 
 
 def csv_text(rows: Iterable[Iterable[object]]) -> str:
-    """Write rows as CSV, numbers in full."""
+    """Return rows as CSV, numbers in full."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(map(csv_cell, row) for row in rows)
     return text.getvalue()
 
 
 def table_csv(table: Table) -> str:
-    """Write a table as CSV."""
+    """Return a table as CSV."""
     table = shown(table)
     return csv_text([table.columns, *plain_rows(table)])

@@ -16,7 +16,7 @@ from jointfrf.toml.declared import Keys
 
 __all__ = ["MeasuredStructure", "ModelStructure", "Structure", "SubstructureKeys"]
 
-#: Two frequencies are the same line if they differ by less than this share: Universal Files hold six digits.
+#: Relative difference of frequencies below which they are the same line: Universal Files have six digits.
 _SAME_LINE = 1e-5
 
 
@@ -104,7 +104,7 @@ class MeasuredStructure(Structure):
         return {str(node): np.asarray(at) for node, at in (self.frfs.coordinates or {}).items()}
 
     def check_points(self, joint: Sequence[str], internal: Sequence[str]) -> None:
-        """Raise an error if an FRF is missing, or a point does not move where it is driven."""
+        """Raise an error if an FRF is missing, or a driving point does not move."""
         channels = [Channel.parse(name) for name in (*joint, *internal)]
         _check_once([f"{channel.node}:{channel.axis}" for channel in channels[: len(joint)]])
         h = self.frfs.matrix(channels, channels)
@@ -118,7 +118,7 @@ class MeasuredStructure(Structure):
         return h
 
     def lines_at(self, freq_hz: FloatArray) -> list[int]:
-        """Return the lines of the set at given frequencies; raises a ValueError where it has none there."""
+        """Return the lines of the set at given frequencies, or raise ValueError if one is missing."""
         held = self.frfs.freq_hz
         above = np.clip(np.searchsorted(held, freq_hz), 1, max(held.size - 1, 1))
         below = above - 1

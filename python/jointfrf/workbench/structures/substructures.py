@@ -204,7 +204,7 @@ class MatricesKeys(SubstructureKeys, tag="matrices"):
         return ModelStructure(model, about=about, patches=tuple(patches))
 
     def _path(self, name: str) -> Path:
-        """Return the path of a file of matrices, with the name of one in it where that is said."""
+        """Return the path of a file of matrices, with the name of a matrix in it if there is one."""
         file, mark, title = str(getattr(self, name)).rpartition("#")
         if mark and not (self.table.folder / f"{file}#{title}").exists():
             found = TomlTable({name: file}, self.table.where, self.table.folder).file(name)
@@ -218,7 +218,7 @@ class MatricesKeys(SubstructureKeys, tag="matrices"):
         return model_units(self.units or "SI")
 
     def _check_sizes(self, paths: Mapping[str, Path], stored: Mapping[str, StoredMatrix]) -> None:
-        """Raise an error for a matrix of another size than K, where it does not name its DOFs."""
+        """Raise an error for a matrix of another size than K that does not name its DOFs."""
         n = stored["stiffness"].matrix.shape[0]
         for name, one in stored.items():
             if one.dofs is None and one.matrix.shape[0] != n:
@@ -265,7 +265,7 @@ class MatricesKeys(SubstructureKeys, tag="matrices"):
 def _without_empty(
     found: Mapping[str, sparse.csr_array], dofs: tuple[str, ...]
 ) -> tuple[dict[str, sparse.csr_array], tuple[str, ...], int]:
-    """Leave out DOFs without any entry, which some programs keep of what is held; return how many."""
+    """Leave out DOFs without any entry, which some programs write for supports, and return their number."""
     filled = np.zeros(len(dofs), bool)
     for matrix in found.values():
         filled |= abs(matrix).sum(axis=1) > 0
@@ -278,7 +278,7 @@ def _without_empty(
 def _in_si(
     found: Mapping[str, sparse.csr_array], dofs: Sequence[str], units: ModelUnits
 ) -> dict[str, sparse.csr_array]:
-    """Return the matrices in SI units: rotations, and modal coordinates like them, by the unit of length."""
+    """Return the matrices in SI units; rotations and modal coordinates scale with the unit of length."""
     if units.name == "SI":
         return dict(found)
     scale = np.array([1.0 if dof.rpartition(":")[2] in DIRECTIONS[:3] else units.length for dof in dofs])
@@ -288,7 +288,7 @@ def _in_si(
 
 
 def _places(dofs: Sequence[str], file: NodeFile, units: ModelUnits) -> dict[str, FloatArray]:
-    """Return where the nodes of the DOFs are, m."""
+    """Return the places of the nodes of the DOFs, m."""
     length = 1.0 if file.is_si else units.length
     nodes = dict.fromkeys(dof.rpartition(":")[0] for dof in dofs)
     return {node: length * file.coordinates[node] for node in nodes if node in file.coordinates}
@@ -297,7 +297,7 @@ def _places(dofs: Sequence[str], file: NodeFile, units: ModelUnits) -> dict[str,
 def _about(
     paths: Mapping[str, Path], stored: Mapping[str, StoredMatrix], units: ModelUnits, held: int, turned: int
 ) -> str:
-    """Say which files a model is of, and what was done with them."""
+    """Return the files of a model, and the changes made to their matrices, as text."""
     names = ", ".join(dict.fromkeys(path.name for path in paths.values()))
     program = next((one.program for one in stored.values() if one.program), "")
     text = f"{names} ({program + ', ' if program else ''}{units.name})"
@@ -309,7 +309,7 @@ def _about(
 
 
 def _unsymmetric(path: Path, matrix: sparse.csr_array) -> str:
-    """Say where a matrix is not symmetric."""
+    """Return the place where a matrix is not symmetric, as text."""
     difference = sparse.coo_array(matrix - matrix.T)
     worst = int(np.argmax(abs(difference.data)))
     i, j = int(difference.row[worst]), int(difference.col[worst])
@@ -333,10 +333,10 @@ class ChainKeys(SubstructureKeys, tag="chain"):
     masses: Annotated[tuple[float, ...], key("Masses, from one end to the other.", "kg", example=[5.0, 3.0])]
     stiffness: Annotated[
         tuple[float, ...],
-        key("Springs in their order, that to the ground included.", "N/m", example=[2500.0, 3500.0]),
+        key("Springs in their order, with the spring to the ground.", "N/m", example=[2500.0, 3500.0]),
     ]
-    damping: Annotated[tuple[float, ...], key("Dashpots beside the springs.", "N s/m", example=[3.0, 4.0])]
-    ground: Annotated[Ground, key("Which ends are held by a spring.")] = "start"
+    damping: Annotated[tuple[float, ...], key("Dashpots parallel to the springs.", "N s/m", example=[3.0, 4.0])]
+    ground: Annotated[Ground, key("Ends with a spring to the ground.")] = "start"
     loss_factor: Annotated[NotNegative, key("Loss factor eta of the stiffness, K (1 + i eta).")] = 0.0
 
     def structure(self, freq_hz: FloatArray) -> Structure:
@@ -346,13 +346,13 @@ class ChainKeys(SubstructureKeys, tag="chain"):
 
 
 class BeamKeys(SubstructureKeys, tag="beam"):
-    """Beam elements in a line, bending in one plane; DOFs `"1:y"`, `"1:theta"`, ... without those that are held."""
+    """Beam elements in a line, bending in one plane; DOFs `"1:y"`, `"1:theta"`, ..., without the supported ones."""
 
     length: Annotated[Positive, key("Length.", "m", example=0.3)]
     elements: Annotated[int, key("Number of elements.", ge=1, example=6)]
     element: Annotated[BeamElement, key("Theory of the elements.")] = "euler-bernoulli"
     axial: Annotated[bool, key("Whether nodes move along the beam, too (`x`).")] = False
-    ends: Annotated[tuple[End, End], key("How the ends are held.", example=["clamped", "free"])] = ("free", "free")
+    ends: Annotated[tuple[End, End], key("Supports of the ends.", example=["clamped", "free"])] = ("free", "free")
     youngs_modulus: Annotated[Positive, key("Young's modulus.", "N/m^2", example=67e9)]
     density: Annotated[Positive, key("Density.", "kg/m^3", example=2700.0)]
     width: Annotated[Positive, key("Width of the section.", "m", example=0.025)]

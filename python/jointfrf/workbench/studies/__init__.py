@@ -1,5 +1,5 @@
 """Studies: realisations of the noise of a case over a design of factors, on any number of workers.
 
-`design` says which cases a study consists of, `run` computes realisations in chunks and puts them together, `store`
-keeps what they gave; `summary` condenses it to a table and figures, `result` reads and writes it.
+`design` lists the cases of a study, `run` computes realisations in chunks and merges them, `store` keeps the estimates
+in files, `summary` condenses them to a table and figures, `result` reads and writes results.
 """

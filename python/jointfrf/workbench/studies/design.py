@@ -1,4 +1,4 @@
-"""The design of a study: the factors that are varied, and the case at each point."""
+"""Design of a study: factors, and the case at each point."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ __all__ = [
     "parse_factor",
 ]
 
-#: What a factor may be set to: the kinds of a TOML value.
+#: Value of a factor: the kinds of a TOML value.
 FactorValue = float | int | str | bool
 #: A point of a design: factor to value.
 StudyPoint = Mapping[str, FactorValue]
-#: Factors with names of their own: keys that they set, those that a case has. A * is a factor of the value in the file.
+#: Factors with special names, and the keys that they set if the case has them. With a * the values are multipliers.
 _NAMED = {
     "noise": ("noise.level", "measured.noise"),
     "spacing": ("frequency.step",),
@@ -55,25 +55,31 @@ _STEP = re.compile(r"([^.\[\]]+)((?:\[\d+\])?)")
 
 @dataclass(frozen=True)
 class StudyDesign:
-    """What is varied in a study, and which noises and estimators it takes.
+    """Factors, noises and estimators of a study.
 
     Attributes
     ----------
     factors : mapping of str to sequence
-        Factor to the values it takes. A factor is ``"noise"`` (level), ``"spacing"`` of the lines in Hz, ``"lines"``
-        (how many, over the same range), ``"stiffness"`` or ``"damping"`` (times that of the joint), or a key of
-        `case.toml`: ``"frequency.last"``, ``"joint.stiffness"`` (of all DOFs), ``"joint[0].stiffness"``,
-        ``"noise.kind"``; with a * at its end the values are factors of what the file says.
+        Values of each factor, by its name. The name is one of:
+
+        - ``"noise"``: level;
+        - ``"spacing"``: distance of the lines, Hz;
+        - ``"lines"``: number of lines over the same range;
+        - ``"stiffness"``, ``"damping"``: multiplier of the values of the joint;
+        - a key of `case.toml`, such as ``"frequency.last"``, ``"joint.stiffness"`` (all DOFs), ``"joint[0].stiffness"``
+          or ``"noise.kind"``. With a * at its end the values are multipliers of the value in the file.
     arrangement : {"full", "one-at-a-time"}
-        Every combination of values; or one factor at a time, the others as the case has them.
+        Arrangement of the points: every combination of values (default), or one factor at a time, with other factors
+        as in the case.
     noises : sequence of str
-        Names of noises of the case; by default all, or the first one where a factor sets the level.
+        Names of noises of the case. The default is all noises, or the first noise if a factor sets the level.
     estimators : sequence of str, or mapping of str to callable
-        Methods that the kind of case knows; by default those that the case names. Own ones take lines in Hz, FRFs at
-        the joint DOFs j, then k, in m/N, and names of the joint DOFs, and return stiffness of all DOFs, then damping;
-        they can be mixed with words (``{"ismm": None, "mine": function}``).
+        Names of estimators of the kind of case, default the estimators in the case. A function takes lines in Hz, FRFs
+        at the joint DOFs j, then k, in m/N, and names of the joint DOFs, and returns stiffness of all DOFs, then
+        damping. A mapping can contain names and functions (``{"ismm": None, "mine": function}``).
     own_noises : mapping of str to callable
-        In the place of the noises of the case: exact FRFs, seed and number of the realisation to FRFs with noise.
+        Functions that replace the noises of the case: from exact FRFs, seed and number of the realisation to FRFs with
+        noise.
 
     Raises
     ------
@@ -97,7 +103,7 @@ class StudyDesign:
     own_noises: Mapping[str, Pollution] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check factors, and the kinds of the others; whether a case knows their names is seen with the case."""
+        """Check factors and the types of other fields; names are checked with the case."""
         check_choice("arrangement", self.arrangement, get_args(Arrangement))
         check_type("factors", self.factors, Mapping)
         as_names("factors", self.factors)
@@ -112,20 +118,20 @@ class StudyDesign:
 
     @classmethod
     def of_case(cls, folder: Path) -> StudyDesign:
-        """Return the design that the file of a case states, which may be the case as it is."""
+        """Return the design in the file of a case; without one, a design without factors."""
         keys = read_keys(read_toml(folder / "case.toml").table("study"), StudyKeys)
         return keys.build(lambda: cls(keys.factors, keys.arrangement, keys.noises, keys.estimators))
 
     @property
     def points(self) -> list[StudyPoint]:
-        """Every point: factor to value; one without factors is the case as it is."""
+        """Points of the design: value by factor; a single empty point without factors."""
         if self.arrangement == "one-at-a-time" and self.factors:
             return [{name: value} for name, values in self.factors.items() for value in values]
         return [dict(zip(self.factors, values, strict=True)) for values in product(*self.factors.values())]
 
     @property
     def choice(self) -> StudyChoice:
-        """What of a case is studied."""
+        """Noises and estimators of the study."""
         own: dict[str, Estimator] = {}
         if isinstance(self.estimators, Mapping):
             own = {name: one for name, one in self.estimators.items() if one is not None}
@@ -138,7 +144,7 @@ class StudyDesign:
         Raises
         ------
         FileContentError
-            The case has no such key, or does not take a value.
+            The case does not have a key, or rejects a value.
         """
         content = read_toml(folder / "case.toml").content
         for point in self.points:
@@ -149,7 +155,7 @@ class StudyDesign:
             yield point, *read_case_of(folder, table, TomlTable({}, ""))
 
     def identity(self, folder: Path) -> dict[str, Any]:
-        """Return the fields that identify this study: the case as its file has it, and the design."""
+        """Return the fields that identify this study: content of the case file, and the design."""
         choice = self.choice
         return {
             "case": read_toml(folder / "case.toml").content,
@@ -161,7 +167,7 @@ class StudyDesign:
 
 
 def _values_of(name: str, values: Any) -> list[FactorValue]:
-    """Return the values of a factor as a case file has them."""
+    """Return the values of a factor as values of a case file."""
     if isinstance(values, str | bytes) or not isinstance(values, Iterable):
         raise TypeError(f"factor {name!r} is {one_line(values)}; give a list of values")
     found = [value.item() if isinstance(value, np.generic) else value for value in values]
@@ -182,7 +188,7 @@ def _check_functions(name: str, functions: Mapping[str, object]) -> None:
 
 
 def in_words(point: StudyPoint) -> str:
-    """Write a point for a reader: `noise = 0.05, lines = 200`."""
+    """Return a point as text: `noise = 0.05, lines = 200`."""
     return ", ".join(f"{name} = {value}" for name, value in point.items())
 
 
@@ -201,7 +207,7 @@ def parse_factor(word: str) -> tuple[str, list[FactorValue]]:
     Raises
     ------
     ValueError
-        There is no = in it, or nothing beside it.
+        The word has no =, or an empty name or value.
     """
     name, equals, values = word.partition("=")
     if not equals or not name.strip() or not values.strip():
@@ -210,7 +216,7 @@ def parse_factor(word: str) -> tuple[str, list[FactorValue]]:
 
 
 def _value(text: str) -> FactorValue:
-    """Read a value as TOML has it; anything else is a text."""
+    """Return a value read as TOML, or the text if it is no TOML value."""
     try:
         found = tomllib.loads(f"v = {text}")["v"]
     except tomllib.TOMLDecodeError:
@@ -230,13 +236,13 @@ def _changed(content: dict[str, Any], point: StudyPoint, where: str, are_noises_
         if not sum(_set(changed, key, number, where) for key in keys):
             hint = did_you_mean(name, _NAMED)
             raise FileContentError(f"{where}: unknown factor {name!r}{hint or '; name a key of the case'}")
-        if is_level:  # its name in the file says another level
+        if is_level:  # the name in the file states another level
             changed["noise"][0]["name"] = str(changed["noise"][0].get("kind", "noise"))
     return changed
 
 
 def _spacing_of(content: dict[str, Any], lines: FactorValue, where: str) -> float:
-    """Return the spacing at which so many lines lie between the first and the last."""
+    """Return the spacing for a number of lines between the first and the last line."""
     frequency = content.get("frequency", {})
     if not isinstance(lines, int) or lines < 2:
         raise FileContentError(f"{where}: lines is {one_line(lines)}; give a whole number, at least 2")
@@ -247,7 +253,7 @@ def _spacing_of(content: dict[str, Any], lines: FactorValue, where: str) -> floa
 
 
 def _set(content: dict[str, Any], key: str, value: FactorValue, where: str) -> int:
-    """Set a key wherever its tables are, and return in how many."""
+    """Set a key in all its tables, and return their number."""
     steps = _STEP.findall(key.removesuffix("*"))
     if ".".join(name + at for name, at in steps) != key.removesuffix("*"):
         raise FileContentError(f"{where}: {key!r} is no key; write one such as joint.stiffness or joint[0].stiffness")
@@ -281,5 +287,5 @@ def _scaled(table: dict[str, Any], name: str, value: FactorValue, where: str) ->
 
 
 def as_text_of(identity: Mapping[str, Any]) -> str:
-    """Write the fields that identify a study as text, whatever the order of its keys."""
+    """Return the fields that identify a study as text that does not depend on the order of keys."""
     return json.dumps(identity, sort_keys=True, default=str)

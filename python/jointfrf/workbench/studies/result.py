@@ -1,4 +1,4 @@
-"""What a study has found: summary, single realisations, tables, figures, files."""
+"""Results of a study: summary, single realisations, tables, figures, files."""
 
 from __future__ import annotations
 
@@ -38,6 +38,7 @@ class StudyResult:
     Attributes
     ----------
     folder : Path
+        Folder of the study.
     """
 
     folder: Path
@@ -48,7 +49,7 @@ class StudyResult:
 
     @cached_property
     def record(self) -> StudyRecord:
-        """What the study is: case, seed, realisations, groups."""
+        """Case, seed, realisations and groups of the study."""
         return self._store.read()
 
     @property
@@ -58,13 +59,13 @@ class StudyResult:
 
     @cached_property
     def missing(self) -> int:
-        """How many realisations of groups have not been computed."""
+        """Number of realisations of groups that have not been computed."""
         wanted = Span(0, self.record.realisations)
         return sum(span.count for own in self._store.missing(self.record, wanted) for span in own)
 
     @cached_property
     def summary(self) -> list[ParameterSummary]:
-        """Each parameter by each estimator at each point of the design."""
+        """Summary of each parameter by each estimator at each point of the design."""
         return summarise(self._store, self.record)
 
     def estimates(self, group: int) -> tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
@@ -78,14 +79,14 @@ class StudyResult:
         Returns
         -------
         numbers : ndarray of int, shape (r,)
-            Of the realisations.
+            Numbers of the realisations.
         values, low, high : ndarray, shape (r, n_columns)
-            Estimates and the limits of their 95 % intervals in the units of the columns; NaN where there are none.
+            Estimates and the limits of their 95 % intervals in the units of the columns; NaN if there are none.
 
         Raises
         ------
         ValueError
-            There is no such group.
+            The group does not exist.
         """
         if not 0 <= as_integer("group", group) < len(self.groups):
             raise ValueError(f"group must be from 0 to {len(self.groups) - 1}, not {group}")
@@ -99,16 +100,16 @@ class StudyResult:
 
     @property
     def table(self) -> Table:
-        """The summary as a table."""
+        """Return the summary as a table."""
         return study_table(self.record, self.summary, self.missing)
 
     @property
     def figures(self) -> list[Figure]:
-        """Distributions; over each factor: errors beside the bound, and coverage."""
+        """Return figures of the distributions, and of errors, bound and coverage over each factor."""
         return study_figures(self.record, self.summary)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return case, design and summary as JSON holds them; what is not a number is None."""
+        """Return case, design and summary as values for JSON, with None for NaN."""
         record = self.record
         rows = [asdict(row) for row in self.summary]
         return {
@@ -127,7 +128,7 @@ class StudyResult:
         Returns
         -------
         Path
-            The page.
+            File of the page.
 
         Raises
         ------
@@ -142,10 +143,12 @@ class StudyResult:
         Parameters
         ----------
         path : str or Path
+            Path of the file.
 
         Returns
         -------
         Path
+            Path of the written file.
 
         Raises
         ------
@@ -161,22 +164,24 @@ class StudyResult:
         Parameters
         ----------
         path : str or Path
-            For group g of `groups` it holds ``realisations_g``, shape (r,), and ``values_g``, ``low_g``, ``high_g``,
-            shape (r, n_columns); ``groups`` says in JSON what they are.
+            Path of the file. For group g of `groups` it contains ``realisations_g``, shape (r,), and ``values_g``,
+            ``low_g``, ``high_g``, shape (r, n_columns). ``groups`` describes the groups in JSON.
 
         Returns
         -------
         Path
+            Path of the written file.
         """
         _write_npz(self._store, self.record, written_whole(Path(path)))
         return Path(path)
 
     def save_values(self, form: Literal["parquet", "npz"]) -> Path:
-        """Write single realisations into the folder of the study, as `save_parquet` or `save_npz` do.
+        """Write single realisations into the folder of the study, and return the path of the file.
 
         Parameters
         ----------
         form : {"parquet", "npz"}
+            Format of the file, see `save_parquet` and `save_npz`.
 
         Returns
         -------
@@ -186,7 +191,7 @@ class StudyResult:
         Raises
         ------
         FileContentError
-            A link, a pipe or a device is in its place.
+            The path of the file is a link, a pipe or a device.
         MissingPackageError
             pyarrow is not installed.
         """
@@ -202,20 +207,27 @@ class StudyResult:
 
 
 def read_study(folder: str | Path) -> StudyResult:
-    """Read what a study has found, finished or not.
+    """Return the results of a study, finished or not.
 
     Parameters
     ----------
     folder : str or Path
+        Folder of the study.
 
     Returns
     -------
     StudyResult
+        Results so far.
 
     Raises
     ------
     FileContentError
-        The folder holds no study.
+        The folder does not contain a study.
+
+    See Also
+    --------
+    study : compute realisations.
+    merge_studies : merge parts of a study.
     """
     StudyStore(Path(folder)).read()
     return StudyResult(Path(folder))
@@ -224,7 +236,7 @@ def read_study(folder: str | Path) -> StudyResult:
 def _write_report(
     folder: OwnFolder, record: StudyRecord, table: Table, figures: Sequence[Figure], content: Mapping[str, Any]
 ) -> Path:
-    """Write the page of a study and, beside it, its numbers, table and figures."""
+    """Write the page of a study, and its numbers, table and figures into the same folder."""
     check_extras("matplotlib", "jinja2")
     pictures = [Picture(figure, draw(figure)) for figure in figures]
     sections = [

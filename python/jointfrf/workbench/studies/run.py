@@ -1,4 +1,4 @@
-"""Running a study, going on with one, and putting parts of one together."""
+"""Run or continue a study, and merge parts of a study."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from jointfrf.workbench.studies.store import GroupRecord, Span, StudyRecord, Stu
 
 __all__ = ["Chunk", "ChunkResult", "Schedule", "compute_chunk", "merge_studies", "study"]
 
-#: Seconds that a chunk is to take: what a killed worker costs, and long against sending it.
+#: Seconds that a chunk is to take: short enough to lose with a killed worker, long compared with its transfer.
 _CHUNK_SECONDS = 2.0
-#: Chunks for each worker at least, so that all end together.
+#: Least number of chunks for each worker, so that all workers end together.
 _SHARES = 4
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """Some realisations of one group."""
+    """Consecutive realisations of one group."""
 
     group: int
     first: int
@@ -38,7 +38,7 @@ class Chunk:
 
 
 class ChunkResult(NamedTuple):
-    """What a chunk gave, and the seconds that it took."""
+    """Estimates of a chunk, and the seconds that it took."""
 
     estimates: Estimates
     seconds: float
@@ -54,7 +54,7 @@ def compute_chunk(chunk: Chunk) -> ChunkResult:
 
 @dataclass
 class _Queue:
-    """What is left to do of a group, and the seconds that a realisation takes, None before the first is done."""
+    """Missing realisations of a group, and the seconds that a realisation takes (None before the first one)."""
 
     group: EstimateGroup
     spans: list[Span]
@@ -73,9 +73,11 @@ class Schedule:
     Attributes
     ----------
     groups : sequence of EstimateGroup
+        Groups of estimates.
     missing : sequence of list of Span
-        For each group.
+        Missing realisations of each group.
     workers : int
+        Number of workers.
     """
 
     groups: Sequence[EstimateGroup]
@@ -85,11 +87,11 @@ class Schedule:
     _spent: float = field(init=False, default=0.0)
 
     def __post_init__(self) -> None:
-        """Begin with all that is missing."""
+        """Make the queue of each group."""
         self._queues = [_Queue(group, list(spans)) for group, spans in zip(self.groups, self.missing, strict=True)]
 
     def __iter__(self) -> Iterator[Chunk]:
-        """Give chunks one by one."""
+        """Yield chunks one by one."""
         for number, queue in enumerate(self._queues):
             if queue.spans:
                 yield self._take(number, queue.group.side_by_side)
@@ -98,7 +100,7 @@ class Schedule:
                 yield self._take(number, self._size(queue))
 
     def learn(self, chunk: Chunk, seconds: float) -> None:
-        """Take note of the time that a chunk took."""
+        """Store the time that a chunk took."""
         queue = self._queues[chunk.group]
         queue.at_work -= chunk.count
         queue.seconds = seconds / chunk.count
@@ -106,7 +108,7 @@ class Schedule:
 
     @property
     def done(self) -> tuple[int, int]:
-        """Work done and in all, in milliseconds of one worker as far as is known."""
+        """Return finished and total work, in estimated milliseconds of one worker."""
         known = [queue.seconds for queue in self._queues if queue.seconds is not None]
         usual = sum(known) / len(known) if known else 1.0
         ahead = sum((queue.left + queue.at_work) * (usual if queue.seconds is None else queue.seconds)
@@ -121,7 +123,7 @@ class Schedule:
         return max(1, min(by_time, -(-queue.left // (_SHARES * self.workers))))
 
     def _take(self, number: int, size: int) -> Chunk:
-        """Take the next realisations of a group, up to the end of those that are computed side by side."""
+        """Return the next realisations of a group, ending at a multiple of those that are computed together."""
         queue = self._queues[number]
         span, together = queue.spans[0], queue.group.side_by_side
         first_end = (span.first // together + 1) * together
@@ -143,57 +145,65 @@ def study(
     jobs: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> StudyResult:
-    """Estimate the joint of a case from many realisations of the noise, over a design of factors.
+    """Return estimates of the joint of a case from many realisations of the noise, over a design of factors.
 
     Parameters
     ----------
     case : str or Path
         Name or number of a case that comes with jointfrf, or a folder with a `case.toml`, of any kind.
     out : str or Path
-        Folder that holds what has been found: what is there already is not computed again. It is made where it is not.
+        Folder of the results, made if it does not exist. Realisations that it contains are not computed again.
     realisations : int, optional
-        Of each noise at each point of the design; the number in the case by default.
+        Number of realisations of each noise at each point of the design, default the number in the case.
     design : StudyDesign, optional
-        Factors, noises and estimators; by default what the case states in ``[study]``, or the case as it is.
+        Factors, noises and estimators, default the table ``[study]`` of the case, or the case without factors.
     part : range, optional
-        Compute these realisations only, for a job of many: ``range(200, 300)``. See `merge_studies`.
+        Numbers of the realisations to compute, such as ``range(200, 300)`` for one job of many; default all. See
+        `merge_studies`.
     executor : Executor or callable, optional
-        Any executor of `concurrent.futures`, of which only `submit` is used: threads, loky
-        (``client.get_executor()``), MPI (``mpi4py.futures.MPIPoolExecutor()``); or what makes one, such as
-        ``loky.get_reusable_executor``, which is called again where the executor breaks. By default processes of this
-        machine, of which one that dies costs its chunk only.
+        Executor of `concurrent.futures`, of which only `submit` is used: threads, loky (``client.get_executor()``) or
+        MPI (``mpi4py.futures.MPIPoolExecutor()``). A function that makes an executor, such as
+        ``loky.get_reusable_executor``, is called again if the executor breaks. The default is processes of this
+        machine; if a process dies, only its chunk is lost.
     jobs : int, optional
-        Workers: of the default executor (all cores), otherwise what the executor says of itself. With 1 everything is
-        computed in this thread.
+        Number of workers, default all cores, or the number that `executor` states. With 1 everything is computed in
+        this thread.
     progress : callable, optional
-        Called with the work done and in all, in milliseconds of one worker, after each chunk.
+        Function that is called after each chunk with finished and total work, in milliseconds of one worker.
 
     Returns
     -------
     StudyResult
+        Results in the folder.
 
     Raises
     ------
     FileContentError
-        The case or a point of the design is wrong; the folder holds another study, or a damaged file.
+        The case or a point of the design is wrong; the folder contains another study, or a damaged file.
     UnknownCaseError
-        There is no such case.
+        The case does not exist.
     BrokenPoolError
-        The executor has lost its workers, and there is nothing that makes another one. What is finished is kept.
+        The executor has lost its workers, and no function makes another one. Finished chunks are kept.
     ValueError
-        The case knows no such noise or estimator; `part` does not fit.
+        The case has no such noise or estimator, or `part` does not fit.
     TypeError
-        An argument is of another kind: a case that is neither a name nor a folder, not a `StudyDesign`.
+        The case is no name or folder, `design` is no `StudyDesign`, or another argument has the wrong type.
+
+    See Also
+    --------
+    merge_studies : merge parts of a study.
+    read_study : read results from a folder.
+    StudyDesign : factors, noises and estimators.
 
     Notes
     -----
-    Realisation k has the same numbers, bit for bit, whatever the number of workers, the chunks and the parts, on
-    machines with the same processor and engine (`set_engine`); others differ by rounding. All points of the design have
-    the same noise numbers. Each task computes on one thread. Memory does not depend on `realisations`.
+    Realisation k has the same numbers, bit for bit, for any number of workers, chunks and parts, on machines with the
+    same processor and engine (`set_engine`). Other machines differ by rounding. All points of the design have the same
+    noise numbers. Each task computes on one thread. Memory does not depend on `realisations`.
 
-    Finished chunks are kept whatever ends the process: the same call continues. A chunk takes about 2 s.
+    If the process ends early, finished chunks are kept, and the same call continues. A chunk takes about 2 s.
 
-    Scripts that start processes need ``if __name__ == "__main__":`` around what they do.
+    Scripts that start processes need ``if __name__ == "__main__":`` around their main part.
 
     Examples
     --------
@@ -233,7 +243,7 @@ def study(
 
 
 def _compute(store: StudyStore, schedule: Schedule, pool: Pool, progress: Callable[[int, int], None]) -> None:
-    """Compute what is missing, and keep each chunk as it comes."""
+    """Compute missing realisations, and store each finished chunk."""
     for chunk, result in pool.completed(compute_chunk, iter(schedule)):
         _check_result(chunk, result, schedule.groups[chunk.group])
         store.write(chunk.group, chunk.first, result.estimates)
@@ -242,7 +252,7 @@ def _compute(store: StudyStore, schedule: Schedule, pool: Pool, progress: Callab
 
 
 def _check_result(chunk: Chunk, result: object, group: EstimateGroup) -> None:
-    """Check what a worker has sent: it may have another version of jointfrf, or run an estimator of the user."""
+    """Check the result of a worker, which may have another version of jointfrf, or run an estimator of the user."""
     numbers = f"realisations {chunk.first} to {chunk.first + chunk.count - 1} of noise {group.noise!r}"
     if (
         not isinstance(result, ChunkResult)
@@ -266,7 +276,7 @@ def _check_layout(store: StudyStore, held: StudyRecord, ours: StudyRecord) -> No
 
 
 def _prepared(folder: Path, design: StudyDesign, realisations: int | None) -> tuple[list[EstimateGroup], StudyRecord]:
-    """Return what is computed at all points, and what the study is."""
+    """Return the groups of estimates of all points, and the record of the study."""
     groups: list[EstimateGroup] = []
     records: list[GroupRecord] = []
     seen = None
@@ -302,26 +312,32 @@ def _wanted(part: range | None, realisations: int) -> Span:
 
 
 def merge_studies(parts: Sequence[str | Path], out: str | Path) -> StudyResult:
-    """Put parts of one study, computed into different folders, together.
+    """Merge parts of one study from several folders, and return the results.
 
     Parameters
     ----------
     parts : sequence of str or Path
         Folders of the parts; they stay as they are.
     out : str or Path
-        Folder of the whole; it may hold a part already.
+        Folder of the merged study, which may contain a part.
 
     Returns
     -------
     StudyResult
-        Its `missing` says which realisations are in no part; `study` into the same folder computes them.
+        Results of all parts. `missing` is the number of realisations that are in no part; `study` into the same folder
+        computes them.
 
     Raises
     ------
     FileContentError
-        A folder holds no study, or parts of different studies.
+        A folder does not contain a study, or the parts belong to different studies.
     ValueError
-        No part was named.
+        `parts` is empty.
+
+    See Also
+    --------
+    study : compute realisations, all or a part.
+    read_study : read results from a folder.
 
     Examples
     --------

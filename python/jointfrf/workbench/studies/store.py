@@ -1,4 +1,4 @@
-"""What a study has found so far, in a folder: a file for each chunk, written whole: nothing finished is lost."""
+"""Folder of a study: a file for each finished chunk, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ __all__ = ["GroupRecord", "Span", "StudyRecord", "StudyStore", "check_estimates"
 
 #: Version of `study.json`.
 _FORMAT = 1
-#: Name of a chunk: group, first realisation, how many.
+#: Name of a chunk: group, first realisation, number of realisations.
 _NAME = re.compile(r"(\d{1,20})-(\d{1,20})-(\d{1,20})\.npz", re.ASCII)
-#: Bytes of memory that a byte of JSON takes at most: an empty table, `{},`, becomes a dict of 64 bytes.
+#: Largest number of bytes of memory for a byte of JSON: an empty table, `{},`, becomes a dict of 64 bytes.
 _JSON_TIMES = 25
 _RECORD = "study.json"
 
@@ -51,14 +51,16 @@ class Span:
 
 @dataclass(frozen=True)
 class GroupRecord:
-    """What the columns of a group are: at which point of the design, with which noise.
+    """Point of the design, noise and columns of a group of estimates.
 
     Attributes
     ----------
     point : mapping
-        Factor to value.
+        Value by factor.
     noise : str
+        Name of the noise.
     columns : tuple of EstimateColumn
+        Estimator and parameter of each column.
     """
 
     point: StudyPoint
@@ -68,17 +70,18 @@ class GroupRecord:
 
 @dataclass(frozen=True)
 class StudyRecord:
-    """What a study is.
+    """Description of a study.
 
     Attributes
     ----------
     name, title : str
-        Of the case.
+        Name and title of the case.
     seed, realisations : int
-        Realisations of each group.
+        Seed, and number of realisations of each group.
     identity : mapping
-        Fields that identify it, see `StudyDesign.identity`.
+        Fields that identify the study, see `StudyDesign.identity`.
     groups : tuple of GroupRecord
+        Groups of estimates.
     """
 
     name: str
@@ -90,7 +93,7 @@ class StudyRecord:
 
     @property
     def layout(self) -> list[tuple[str, list[tuple[str, str, str]]]]:
-        """Noise and columns of each group, which do not depend on the machine that computed their numbers."""
+        """Return noise and columns of each group, which do not depend on the machine."""
         return [(one.noise, [(each.estimator, each.parameter, each.unit) for each in one.columns])
                 for one in self.groups]  # fmt: skip
 
@@ -132,13 +135,14 @@ class StudyStore:
     Attributes
     ----------
     folder : Path
+        Folder of the study.
     """
 
     folder: Path
 
     @property
     def own(self) -> OwnFolder:
-        """The folder: what is read and written in it."""
+        """Folder, for reading and writing its files."""
         return OwnFolder(self.folder)
 
     @property
@@ -147,16 +151,16 @@ class StudyStore:
 
     @property
     def exists(self) -> bool:
-        """Whether a study was begun here."""
+        """Whether the folder contains a study."""
         return os.path.lexists(self.folder / _RECORD)
 
     def read(self) -> StudyRecord:
-        """Read what the study is.
+        """Return the record of the study.
 
         Raises
         ------
         FileContentError
-            There is no study, or its file is damaged.
+            The folder contains no study, or its file is damaged.
         """
         path = self.folder / _RECORD
         try:
@@ -164,9 +168,7 @@ class StudyStore:
                 ReadLimit(path).take(_JSON_TIMES * os.fstat(file.fileno()).st_size)
                 content = file.read()
         except (FileNotFoundError, NotADirectoryError) as error:
-            raise FileContentError(
-                f"{self.folder} holds no study, as it has no study.json: name the folder of a study"
-            ) from error
+            raise FileContentError(f"{self.folder} contains no study.json; name the folder of a study") from error
         try:
             held = json.loads(content)
             if isinstance(held, dict) and held.get("format", _FORMAT) != _FORMAT:
@@ -187,12 +189,12 @@ class StudyStore:
         return StudyRecord(checked.name, checked.title, checked.seed, checked.realisations, held["identity"], groups)
 
     def begin(self, record: StudyRecord) -> None:
-        """Write what the study is.
+        """Write the record of the study.
 
         Raises
         ------
         FileContentError
-            There are chunks without a `study.json`: nothing states of which study they are.
+            The folder contains chunks without a `study.json`, so that their study is unknown.
         """
         # In this order: another process that begins the same study writes study.json before its first chunk.
         if self.spans(record) and not self.exists:
@@ -208,24 +210,24 @@ class StudyStore:
         self.own.write(_RECORD, json.dumps(content, indent=1, default=str) + "\n")
 
     def check(self, identity: Mapping[str, Any]) -> StudyRecord:
-        """Return the study that was begun here; it must be this one.
+        """Return the record of the study in the folder, after a check of its identity.
 
         Raises
         ------
         FileContentError
-            It is another one, or damaged.
+            The folder contains another study, or a damaged file.
         """
         record = self.read()
         ours = json.loads(as_text_of(identity))
         for key in ours:
             if as_text_of({key: record.identity.get(key)}) != as_text_of({key: ours[key]}):
                 raise FileContentError(
-                    f"{self.folder} holds another study, of {record.name}, whose {key} differ: name another folder"
+                    f"{self.folder} contains another study, of {record.name}, whose {key} differ; name another folder"
                 )
         return record
 
     def write(self, group: int, first: int, estimates: Estimates) -> None:
-        """Keep what a chunk gave."""
+        """Write the estimates of a chunk."""
         content = io.BytesIO()
         has_intervals = not (np.isnan(estimates.low).all() and np.isnan(estimates.high).all())
         if has_intervals:
@@ -236,12 +238,12 @@ class StudyStore:
         self._chunks.write(name, content.getvalue())
 
     def spans(self, record: StudyRecord) -> dict[int, list[tuple[Span, str]]]:
-        """Return group to its chunks and their names, in the order of their realisations.
+        """Return the chunks of each group and their names, in the order of their realisations.
 
         Raises
         ------
         FileContentError
-            A name states a group or realisations that no such study has.
+            A name contains a group or realisations outside the study.
         """
         found: dict[int, list[tuple[Span, str]]] = {}
         for name, status in self._chunks.entries().items():
@@ -255,12 +257,12 @@ class StudyStore:
         return {group: sorted(own) for group, own in found.items()}
 
     def missing(self, record: StudyRecord, wanted: Span) -> list[list[Span]]:
-        """Return for each group which of the realisations wanted are not there.
+        """Return the wanted realisations of each group that are missing.
 
         Raises
         ------
         FileContentError
-            A chunk of realisations wanted is damaged.
+            A chunk with wanted realisations is damaged.
         """
         there = self.spans(record)
         for group, own in there.items():
@@ -270,7 +272,7 @@ class StudyStore:
         return [_gaps([span for span, _ in there.get(group, [])], wanted) for group in range(len(record.groups))]
 
     def chunks(self, record: StudyRecord, group: int) -> Iterator[tuple[int, Estimates]]:
-        """Read the chunks of a group in order, each realisation of the study once: first number, and estimates."""
+        """Yield first number and estimates of the chunks of a group in order, each realisation once."""
         at = 0
         for span, name in self.spans(record).get(group, []):
             first, end = max(at, span.first), min(span.end, record.realisations)
@@ -312,13 +314,14 @@ def _estimates_of(held: Mapping[str, NDArray[Any]]) -> Estimates:
 
 
 def check_estimates(estimates: Estimates, count: int, columns: int) -> None:
-    """Raise a ValueError unless the estimates are those of so many realisations and columns.
+    """Raise ValueError if the estimates do not fit the numbers of realisations and columns.
 
     Parameters
     ----------
     estimates : Estimates
-        Values finite or NaN; intervals of which `low` is at most `high`, infinite where they are unbounded.
+        Values that are finite or NaN, and intervals whose `low` is at most `high`, infinite if they are unbounded.
     count, columns : int
+        Number of realisations and number of columns.
     """
     for name, part in zip(Estimates._fields, estimates, strict=True):
         if not isinstance(part, np.ndarray) or part.dtype != np.float64:
@@ -334,7 +337,7 @@ def check_estimates(estimates: Estimates, count: int, columns: int) -> None:
 
 
 def _gaps(there: Sequence[Span], wanted: Span) -> list[Span]:
-    """Return what of a span is not covered by others, which are sorted."""
+    """Return the parts of a span that a sorted sequence of spans does not cover."""
     found, at = [], wanted.first
     for span in there:
         if span.end <= at or span.first >= wanted.end:

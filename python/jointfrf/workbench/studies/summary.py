@@ -1,4 +1,4 @@
-"""What a study shows of each parameter, as a table and as figures: moments, percentiles, coverage, the bound."""
+"""Summary of a study as a table and figures: moments, percentiles, coverage and bound of each parameter."""
 
 from __future__ import annotations
 
@@ -39,20 +39,21 @@ class ParameterSummary:
     Attributes
     ----------
     point : mapping
-        Factor to value.
+        Value by factor.
     noise, estimator, parameter, unit : str
+        Names of noise, estimator and parameter, and the unit of the parameter.
     actual : float
-        NaN where it is not known; so are `bias`, `rmse` and `coverage` then.
+        Actual value. If it is unknown, `actual`, `bias`, `rmse` and `coverage` are NaN.
     count, failed : int
-        Realisations, and how many of them gave nothing; these are excluded.
+        Number of realisations, and of realisations without an estimate, which are excluded.
     mean, std, median, low, high : float
         Mean, standard deviation, median, 2.5 and 97.5 percentile of the estimates.
     bias, rmse : float
         Mean error, and root-mean-square error.
     bound : float
-        Least standard deviation (Cramer-Rao), NaN where it is not known.
+        Least standard deviation (Cramer-Rao), NaN if it is unknown.
     coverage : float
-        Share of the 95 % intervals that hold the actual value, NaN without intervals.
+        Share of the 95 % intervals that contain the actual value, NaN without intervals.
     """
 
     point: StudyPoint
@@ -75,7 +76,7 @@ class ParameterSummary:
 
 
 class _Sums:
-    """Moments of columns, added up chunk by chunk."""
+    """Moments of columns, updated chunk by chunk."""
 
     def __init__(self, actual: FloatArray) -> None:
         self.actual = actual
@@ -103,7 +104,7 @@ class _Sums:
 
 
 def sample_of(store: StudyStore, record: StudyRecord, group: int) -> FloatArray:
-    """Return values of a group, shape (r, n_columns): all of them, or the first ones of very many."""
+    """Return values of a group, shape (r, n_columns), at most the first 4e6 numbers."""
     columns = len(record.groups[group].columns)
     most, rows = max(1, _SAMPLE // columns), [np.empty((0, columns))]
     for _, estimates in store.chunks(record, group):
@@ -115,18 +116,20 @@ def sample_of(store: StudyStore, record: StudyRecord, group: int) -> FloatArray:
 
 
 def summarise(store: StudyStore, record: StudyRecord) -> list[ParameterSummary]:
-    """Condense a study, a group at a time.
+    """Return the summary of a study, computed group by group.
 
     Parameters
     ----------
     store : StudyStore
+        Folder of the study.
     record : StudyRecord
-        What the store holds.
+        Record of the study in the store.
 
     Returns
     -------
     list of ParameterSummary
-        In the order of the design. Percentiles are those of the first 4e6 numbers of a group, all else of all.
+        Summaries in the order of the design. Percentiles use at most the first 4e6 numbers of a group, other statistics
+        all numbers.
     """
     found = []
     for number, group in enumerate(record.groups):
@@ -153,7 +156,7 @@ def summarise(store: StudyStore, record: StudyRecord) -> list[ParameterSummary]:
 
 
 def study_table(record: StudyRecord, summary: Sequence[ParameterSummary], missing: int) -> Table:
-    """Return the summary as a table, columns that hold nothing left out."""
+    """Return the summary as a table without empty columns."""
     factors = list(dict.fromkeys(name for row in summary for name in row.point))
     values = [_numbers(row) for row in summary]
     kept = [c for c, name in enumerate(_NUMBERS) if any(row[c] is not None for row in values)]
@@ -182,7 +185,7 @@ def _cell(value: FactorValue | None) -> Cell:
 
 
 def _numbers(row: ParameterSummary) -> list[float | None]:
-    """Return the numbers of a row, None where there are none."""
+    """Return the numbers of a row, with None for missing ones."""
     size = abs(row.actual) or float("nan")
     numbers = (
         row.actual, row.median, row.low, row.high, 100 * row.bias / size, 100 * row.rmse / size,
@@ -191,18 +194,18 @@ def _numbers(row: ParameterSummary) -> list[float | None]:
     return [None if value != value else value for value in numbers]
 
 
-#: Intervals that a panel holds, and panels that a figure holds.
+#: Largest number of intervals in a panel, and of panels in a figure.
 _MOST_INTERVALS, _MOST_PANELS = 24, 24
-#: Styles of estimators in their order, distinguishable in grey print; the last one is that of the bound.
+#: Styles of estimators in their order, distinguishable in grey print; the last style is for the bound.
 _STYLES = ("ismm-points", "compliance-points", "third-points", "fourth-points", "fifth-points")
-#: Values of a factor that span more than this ratio are drawn over a logarithmic axis.
+#: Ratio of largest to smallest value of a factor above which its axis is logarithmic.
 _WIDE = 5.0
 #: Half of the central 95 % of a normal distribution, in standard deviations.
 _REACH = 1.96
 
 
 def study_figures(record: StudyRecord, summary: Sequence[ParameterSummary]) -> list[Figure]:
-    """Return the figures, those of factors with at least two numbers as values."""
+    """Return the figures of distributions, and of factors with at least two numbers as values."""
     figures = [_distributions(summary)]
     for name in record.identity["factors"]:
         over = [row for row in summary if isinstance(row.point.get(name), int | float)]
@@ -213,7 +216,7 @@ def study_figures(record: StudyRecord, summary: Sequence[ParameterSummary]) -> l
     return [figure for figure in figures if not all(panel.is_blank for panel in figure.panels)]
 
 
-#: Captions, of the factor named.
+#: Captions by factor.
 _RMSE = "Root-mean-square error over {}"
 _BOUND = (
     ", and least standard deviation of an unbiased estimate (Cramér-Rao bound); shaded: where the error of an estimate "
@@ -241,12 +244,12 @@ def _axis(row: ParameterSummary) -> str:
 
 
 def _distributions(summary: Sequence[ParameterSummary]) -> Figure:
-    """Median and central 95 % of every parameter."""
+    """Return a figure of median and central 95 % of every parameter."""
     panels = []
     for parameter in _parameters(summary):
         rows = [row for row in summary if row.parameter == parameter and np.isfinite(row.median)][:_MOST_INTERVALS]
         actual = [row.actual for row in rows if np.isfinite(row.actual)]
-        # Where the actual value itself is varied, estimates are shown as shares of it.
+        # If the actual value is varied, estimates are shown as shares of it.
         scale = [abs(row.actual) if len(set(actual)) > 1 and row.actual else 1.0 for row in rows]
         is_share = len(set(actual)) > 1
         intervals = tuple(
@@ -282,7 +285,7 @@ def _over(
     key: str,
     caption: str,
 ) -> Iterator[Figure]:
-    """Give a figure over a factor for every set of values of the others, and every noise."""
+    """Yield a figure over a factor for every noise and set of values of other factors."""
     others = list(dict.fromkeys(_others(row, name) for row in rows))
     for number, other in enumerate(others, 1):
         own = [row for row in rows if _others(row, name) == other]
@@ -299,12 +302,12 @@ def _over(
 
 
 def _others(row: ParameterSummary, name: str) -> tuple[str, ...]:
-    """Return in words what a row belongs to beside one factor: its noise, and the values of the others."""
+    """Return noise and values of the factors of a row as texts, except one factor."""
     return (f"noise {row.noise}", *(f"{other} {value}" for other, value in row.point.items() if other != name))
 
 
 def _lines(rows: Sequence[ParameterSummary], name: str) -> Iterator[tuple[str, FloatArray, list[ParameterSummary]]]:
-    """Give the estimators with their rows in the order of the factor."""
+    """Yield the estimators with their rows in the order of the factor."""
     for estimator in dict.fromkeys(row.estimator for row in rows):
         own = sorted((row for row in rows if row.estimator == estimator), key=lambda row: float(row.point[name]))
         yield estimator, np.array([float(row.point[name]) for row in own]), own
@@ -316,7 +319,7 @@ def _is_wide(rows: Sequence[ParameterSummary], name: str) -> bool:
 
 
 def _rmse_panel(rows: list[ParameterSummary], name: str) -> Panel:
-    """Draw errors beside the bound; n squares of normal errors at the bound sum to chi-squared of n."""
+    """Return a panel of errors and bound; n squared normal errors at the bound sum to chi-squared of n."""
     curves: list[Curve] = []
     bounds: list[Curve] = []
     bands: list[Ribbon] = []
@@ -358,7 +361,7 @@ def _coverage_panel(rows: list[ParameterSummary], name: str) -> Panel:
 
 
 def _limits(rows: Sequence[ParameterSummary], name: str) -> tuple[float, float]:
-    """Return limits of the axis of a factor, so that the outer points lie inside."""
+    """Return limits of the axis of a factor with a margin around the outer points."""
     values = [float(row.point[name]) for row in rows]
     low, high = min(values), max(values)
     if _is_wide(rows, name):

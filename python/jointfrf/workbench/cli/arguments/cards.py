@@ -42,7 +42,7 @@ def _ends(text: str, program: str, rest: str) -> list[int]:
         raise argparse.ArgumentTypeError(f"{text!r} names a node twice; give different nodes")
     if len(ends) not in (2, 4 if program == "calculix" else 2):
         raise argparse.ArgumentTypeError(
-            f"{text!r} is no program with nodes j and k; use abaqus:9001,9002, for several joints "
+            f"{text!r} is no program with nodes j and k. Use abaqus:9001,9002, for several joints "
             "abaqus:fl=9001,9002:fr=9003,9004, with two more ROT NODEs for calculix"
         )
     return ends

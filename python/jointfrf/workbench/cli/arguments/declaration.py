@@ -1,4 +1,4 @@
-"""How an option is declared: as a field of a typed class, from which parser, configuration and documents are made."""
+"""Declaration of options as fields of typed classes, from which parser, configuration and documents are made."""
 
 import argparse
 import inspect
@@ -16,7 +16,7 @@ __all__ = ["Arguments", "DeclaredArgument", "Form", "declared", "flag", "number"
 
 
 class Form(NamedTuple):
-    """How a word becomes a value, as metadata of `Annotated`.
+    """Conversion of a word to a value, as metadata of `Annotated`.
 
     Attributes
     ----------

@@ -68,7 +68,7 @@ class BackboneArguments(Arguments):
 
 
 class FilterArguments(Arguments):
-    """How a mode is taken out of a record; keywords of `decay_of_mode`."""
+    """Options of the extraction of a mode from a record; keywords of `decay_of_mode`."""
 
     start: float | None = option(
         "time after which nothing drives the structure",
