@@ -1,4 +1,4 @@
-"""A case of a bolted lap joint: the keys of its files, and the case that they give."""
+"""Keys of the files of a case of a bolted lap joint, and the case itself."""
 
 from __future__ import annotations
 
@@ -108,22 +108,28 @@ class BoltedLapExpected(ExpectedKeys):
 
 @dataclass(frozen=True, kw_only=True)
 class BoltedLapCase(Case, WithActualJoint):
-    """A lap joint with a preloaded bolt of solid elements, and what is measured on it.
+    """Case of a lap joint with a preloaded bolt of solid elements.
 
     Attributes
     ----------
     beams : LapBeams
+        Dimensions and material of the beams.
     bolt : Bolt
+        Dimensions and material of the bolt.
     preload : float
-        N.
+        Preload force, N.
     friction : float
+        Coefficient of friction.
     spacing : tuple of float
-        s_x and s_z of the measured points, m.
+        Distances s_x and s_z of the measured points, m.
     joint : Joint
         Known joint of the error analysis, in the order of (4.5).
     bands : BandSet
+        Sensitive bands.
     noises : tuple of Noise
+        Noises, each with its methods.
     expected : ExpectedFrequencies or None
+        Expected natural frequencies.
     """
 
     beams: LapBeams
@@ -138,7 +144,7 @@ class BoltedLapCase(Case, WithActualJoint):
 
 
 def read_bolted_lap(common: Case, keys: BoltedLapKeys, expected: BoltedLapExpected) -> BoltedLapCase:
-    """Return the case that its files give; raises FileContentError."""
+    """Return the case of its files; raise FileContentError if they are invalid."""
     joint, _ = joints_of(keys.joint)
     if len(keys.joint) != len(DOFS):
         raise keys.joint[0].error("dof", f"the first of six: {', '.join(DOFS)}")

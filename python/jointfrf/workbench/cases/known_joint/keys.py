@@ -1,4 +1,4 @@
-"""A case of a known joint: the keys of its files, and the case that they give."""
+"""Keys of the files of a case of a known joint, and the case itself."""
 
 from __future__ import annotations
 
@@ -199,21 +199,24 @@ class KnownJointExpected(ExpectedKeys):
 
 @dataclass(frozen=True, kw_only=True)
 class KnownJointCase(Case, WithActualJoint):
-    """A simulated identification.
+    """Case of a simulated identification.
 
     Attributes
     ----------
     a, b : Structure
+        Substructures.
     points : mapping of str to tuple of str
-        Names of the joint DOFs, "j" in A and "k" in B, and of internal ones, "r" in A and "s" in B.
+        Names of the joint DOFs, "j" in A and "k" in B, and of internal DOFs, "r" in A and "s" in B.
     joint, initial : Joint
-        The actual joint and its first estimate.
+        Actual joint and its first estimate.
     observed : tuple of Observed
-        FRFs of the assembly that are looked at.
+        Observed FRFs of the assembly.
     band_sets : tuple of BandSet
-        The first is that of the tables.
+        Sets of bands; tables use the first.
     noises : tuple of Noise
+        Noises, each with its methods.
     expected : KnownJointExpected
+        Published numbers.
     """
 
     a: Structure
@@ -228,13 +231,13 @@ class KnownJointCase(Case, WithActualJoint):
 
     @property
     def models(self) -> tuple[ModelStructure, ModelStructure] | None:
-        """Both substructures where both are known by their models, else None."""
+        """Both substructures if both have models, otherwise None."""
         a, b = self.a, self.b
         return (a, b) if isinstance(a, ModelStructure) and isinstance(b, ModelStructure) else None
 
 
 def read_known_joint(common: Case, keys: KnownJointKeys, expected: KnownJointExpected) -> KnownJointCase:
-    """Return the case that its files give; raises FileContentError."""
+    """Return the case of its files; raise FileContentError if they are invalid."""
     a, b = (one.structure(common.freq_hz) for one in (keys.substructure_a, keys.substructure_b))
     methods = list(dict.fromkeys(method for noise in keys.noise for method in noise.methods))
     joint, initial = joints_of(keys.joint, next(filter(_begins_with_estimate, methods), ""))
@@ -290,7 +293,7 @@ def _observed(keys: KnownJointKeys, dofs: tuple[str, ...], freq_hz: FloatArray) 
 
 
 def _check_expected(case: KnownJointCase) -> None:
-    """Check that what is expected belongs to the case."""
+    """Raise an error if `expected.toml` does not match the case."""
     expected, methods = case.expected, {noise.name: noise.methods for noise in case.noises}
     parameters, observed = [one.name for one in case.parameters], {one.key: one.bands for one in case.observed}
     for name in ("frequencies", "printed"):
