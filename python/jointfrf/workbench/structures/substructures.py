@@ -346,7 +346,7 @@ class ChainKeys(SubstructureKeys, tag="chain"):
 
 
 class BeamKeys(SubstructureKeys, tag="beam"):
-    """Beam elements in a line, bending in one plane; DOFs `"1:y"`, `"1:theta"`, ... without those that are held."""
+    """Beam elements in a line, bending in one plane; DOFs `"1:y"`, `"1:theta"`, ... without fixed DOFs."""
 
     length: Annotated[Positive, key("Length.", "m", example=0.3)]
     elements: Annotated[int, key("Number of elements.", ge=1, example=6)]
