@@ -89,7 +89,7 @@ class Channel:
         check_type("channel", text, str)
         match = _CHANNEL.fullmatch(text.strip().lower())
         if match is None:
-            raise ValueError(f"{text!r} is no channel; write a node and a direction, such as 102:+y or 102:rx")
+            raise ValueError(f"{text!r} is no channel; write a node and a direction, such as 102:+y (rotation rx)")
         return cls(int(match[1]), match[2])
 
     @property

@@ -386,7 +386,7 @@ def changed(element, place, node):
         (NODES[:, :2], ELEMENTS, r"nodes must have shape \(n, 3\)"),
         (NODES, ELEMENTS[:, :7], r"elements must be node numbers of shape \(n, 8\), not int64 of shape \(3, 7\)"),
         (NODES, ELEMENTS + 0.5, "elements must be node numbers .* not float64"),
-        (NODES, ELEMENTS[:0], "elements must hold at least one element"),
+        (NODES, ELEMENTS[:0], "elements must contain at least one element"),
     ],
 )
 def test_bad_meshes_are_named(nodes, elements, message):

@@ -310,7 +310,7 @@ def test_differences_find_what_lies_between_their_points(capsys):
         softer = 1 / (1 / 5e3 + 2 * (spacing / (3 * inertia) + 1 / (shear * spacing)))
         assert_allclose(5e3 + shift["k_Mtheta"], softer, rtol=0.1)
     assert main([*words, "--spacings", "0.0005"]) == 1
-    assert "no node lies 0.0005 m beside 301 along x" in capsys.readouterr().err
+    assert "no node lies 0.0005 m from 301 along x" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

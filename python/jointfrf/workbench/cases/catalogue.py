@@ -1,4 +1,4 @@
-"""Find cases and read one; the kinds of cases and their keys."""
+"""List of cases, reading of a case, and the kinds of cases with their keys."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ __all__ = [
 
 
 class UnknownCaseError(ValueError):
-    """There is no such case; one line, whatever word was given."""
+    """Error for an unknown case, with a message of one line."""
 
     def __init__(self, message: str) -> None:
         super().__init__("\\n".join(message.splitlines()))
 
 
 def cases_folder() -> Path | None:
-    """Return the folder of the cases that come with the package: installed, or in the source tree; None if absent."""
+    """Return the folder of the cases of the package, installed or in the source tree; None if it does not exist."""
     package = Path(__file__).resolve().parents[2]
     for folder in (package / "data" / "cases", package.parents[1] / "cases"):
         if folder.is_dir() and any(folder.glob("*/case.toml")):
@@ -45,7 +45,7 @@ def cases_folder() -> Path | None:
 
 
 def list_cases() -> list[Path]:
-    """Return the folders of the cases that come with the package, in the order of their numbers; others last."""
+    """Return the folders of the cases of the package in the order of their numbers, then folders without a number."""
     folder = cases_folder()
     found = [] if folder is None else [path.parent for path in folder.glob("*/case.toml")]
 
@@ -57,7 +57,7 @@ def list_cases() -> list[Path]:
 
 
 def case_title(folder: Path) -> str:
-    """Return the title of a case without reading the rest of it."""
+    """Return the title of a case without its other keys."""
     return str(read_toml(folder / "case.toml").content.get("title", ""))
 
 
@@ -67,7 +67,7 @@ def find_case(word: str) -> Path:
     Parameters
     ----------
     word : str
-        A folder that holds a `case.toml`, or the name or the number of a case that comes with the package.
+        Folder with a `case.toml`, or the name or the number of a case of the package.
 
     Returns
     -------
@@ -76,7 +76,12 @@ def find_case(word: str) -> Path:
     Raises
     ------
     UnknownCaseError
-        There is none.
+        No case has this folder, name or number.
+
+    See Also
+    --------
+    list_cases : Folders of all cases of the package.
+    read_case : Case in a folder.
     """
     if (Path(word) / "case.toml").is_file():
         return Path(word)
@@ -91,41 +96,46 @@ def find_case(word: str) -> Path:
 
 
 def kind_named(name: str) -> CaseKind[Any, Any, Any]:
-    """Return a kind of cases by the value of `kind` in `case.toml`: the `KIND` of the package of this name."""
+    """Return a kind of case by the value of `kind` in `case.toml`."""
     kind: CaseKind[Any, Any, Any] = import_module(f"jointfrf.workbench.cases.{name.replace('-', '_')}").KIND
     return kind
 
 
 def read_case(folder: Path) -> Case:
-    """Read a case of the kind that its `case.toml` names.
+    """Return the case in a folder, of the kind in its `case.toml`.
 
     Parameters
     ----------
     folder : Path
-        Folder with `case.toml` and, if there are numbers to compare with, `expected.toml`.
+        Folder with `case.toml` and, if there are expected results, `expected.toml`.
 
     Returns
     -------
     Case
-        As the `read` of its kind returned it.
+        Case of the class of its kind.
 
     Raises
     ------
     FileContentError
-        One sentence that names the file and the key.
+        Invalid content; the message is one sentence with the file and the key.
+
+    See Also
+    --------
+    find_case : Folder of a case.
+    jointfrf.workbench.cases.run.run_case : Computation and report of a case.
     """
     return read_case_and_kind(folder)[0]
 
 
 def read_case_and_kind(folder: Path) -> tuple[Case, CaseKind[Any, Any, Any]]:
-    """Read a case as `read_case` does, and return its kind, too."""
+    """Return the case in a folder and its kind."""
     path = folder / "expected.toml"
     expected = read_toml(path) if path.is_file() else TomlTable({}, str(path))
     return read_case_of(folder, read_toml(folder / "case.toml"), expected)
 
 
 def read_case_of(folder: Path, table: TomlTable, expected: TomlTable) -> tuple[Case, CaseKind[Any, Any, Any]]:
-    """Read a case from the tables of its `case.toml` and its `expected.toml`."""
+    """Return a case and its kind from the tables of its `case.toml` and its `expected.toml`."""
     name = table.content.get("kind", CASE_KINDS[0])
     if name not in CASE_KINDS:
         raise table.error("kind", f"one of {', '.join(CASE_KINDS)}")
@@ -144,15 +154,15 @@ def read_case_of(folder: Path, table: TomlTable, expected: TomlTable) -> tuple[C
     return case, kind
 
 
-#: What the reference of keys begins with.
+#: First paragraph of the reference of keys.
 _KEYS_HEAD = """# Keys of case files
 
 <!-- jointfrf cases --keys > docs/case-keys.md -->
 
-A case is a folder with a `case.toml` and, where something is known about it beforehand, an `expected.toml`;
-[cases](cases.md) says how one is run, `jointfrf new KIND FOLDER` writes one to begin with. SI units. Files that a key
-names are relative to the folder. A key that is not in this list is an error that lists those that are. `DOF` in a key
-stands for the name of a joint DOF (`k_theta_z`).
+A case is a folder with a `case.toml` and, for a comparison with expected results, an `expected.toml`. To run a case,
+see [cases](cases.md). To write a first case, run `jointfrf new KIND FOLDER`. All values are in SI units. Paths of files
+are relative to the folder. A key that is not on this page is an error, and the message lists the valid keys. `DOF` in a
+key stands for the name of a joint DOF (`k_theta_z`).
 
 """
 

@@ -1,4 +1,4 @@
-"""Comparison of results with `expected.toml`: rows with verdicts, tables of them, and how many fit."""
+"""Comparison of results with `expected.toml`: rows with verdicts, their tables, and numbers of rows that fit."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ _FITS, _DOES_NOT_FIT = "fits", "does not fit"
 
 
 class Compared(NamedTuple):
-    """A row of results, and whether it fits the expected number; None without such a number."""
+    """Row of results and its verdict: whether it fits the expected number, or None without an expected number."""
 
     cells: tuple[Cell, ...]
     fits: bool | None
 
 
 class Ranked(NamedTuple):
-    """An expected value among realisations.
+    """Rank of an expected value among realisations.
 
     Attributes
     ----------
     median, low, high : float
-        50, 2.5 and 97.5 percentile of the realisations.
+        Percentiles 50, 2.5 and 97.5 of the realisations.
     percentile : float or None
-        Share of the realisations below the expected value, percent; None without an expected value.
+        Percentage of the realisations below the expected value; None without an expected value.
     fits : bool or None
         Whether the expected value lies between `low` and `high`.
     """
@@ -83,7 +83,7 @@ def tables_of_sources(
     note: str,
     percentages: tuple[str, ...] = (),
 ) -> list[Table]:
-    """Return one table for each source of expected numbers; its title is the source, then `what`."""
+    """Return one table for each source of expected numbers; its title is the source followed by `what`."""
     by_source: dict[str, list[Compared]] = {}
     for source, row in rows:
         by_source.setdefault(source, []).append(row)
@@ -107,15 +107,21 @@ def compared_frequencies(
     Parameters
     ----------
     title : str
+        Title of the table.
     columns : sequence of str
         Headings of the cells that name a mode.
     groups : iterable of (names, frequencies, expected)
-        Modes: the cells that name each, their frequencies in Hz, and the expected frequencies.
+        Groups of modes: cells that name each mode, frequencies in Hz, and expected frequencies or None.
     note : str
+        Note below the table.
 
     Returns
     -------
     Table
+
+    See Also
+    --------
+    agreement : Table that counts the verdicts.
     """
     rows = []
     for names, frequencies, expected in groups:
@@ -131,16 +137,21 @@ def compared_frequencies(
 
 
 def agreement(tables: Sequence[Table]) -> Table:
-    """Return the table that counts the verdicts of others, separately for each noise and each set of bands.
+    """Return the table that counts the verdicts of other tables for each noise and each set of bands.
 
     Parameters
     ----------
     tables : sequence of Table
+        Tables with verdicts.
 
     Returns
     -------
     Table
-        How many rows fit, and which parameters do not.
+        Numbers of rows that fit, and parameters that do not fit.
+
+    See Also
+    --------
+    verdict_sentence : Summary in one sentence.
     """
     rows = []
     for table in tables:
@@ -160,7 +171,7 @@ def agreement(tables: Sequence[Table]) -> Table:
 
 
 def verdict_sentence(summary: Sequence[Table]) -> str:
-    """Return how many of the comparisons counted by `agreement` fit, and the tables of the rest; "" without any."""
+    """Return the number of comparisons in `agreement` that fit, and the tables with misfits; "" without comparisons."""
     table = next((one for one in summary if one.key == "agreement" and one.rows), None)
     if table is None:
         return ""

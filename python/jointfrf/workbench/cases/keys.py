@@ -1,4 +1,4 @@
-"""What several kinds of cases say: common keys, frequency lines, a joint, bands, noise, observed FRFs."""
+"""Keys of several kinds of cases: frequency lines, a joint, bands, noise, and observed FRFs."""
 
 from __future__ import annotations
 
@@ -43,20 +43,20 @@ __all__ = [
     "joints_of",
 ]
 
-#: All methods that a case can name.
+#: All methods of cases.
 METHODS: tuple[str, ...] = ("compliance", *STIFFNESS_METHODS, "decoupling-fit")
-#: Methods that take all lines, not means over bands.
+#: Methods that fit all lines in place of means over bands.
 FITTED = ("compliance", "decoupling-fit")
-#: More lines are a step that is a slip.
+#: Largest number of lines; more lines are probably a wrong step.
 MOST_LINES = 1_000_000
-#: What lists of points take.
+#: Values of lists of points.
 LIKE_DOFS = "list of texts, as many as joint DOFs"
-#: A higher level of noise is more often 5 % written as 5 than meant.
+#: Noise levels above this limit need a confirmation, because 5 % is often written as 5.
 _HIGH_LEVEL = 0.5
 
 
 class FrequencyKeys(Keys):
-    """Frequency lines: evenly spaced, or those of a file of FRFs."""
+    """Frequency lines: evenly spaced, or from a file of FRFs."""
 
     first: Annotated[
         NotNegative | None,
@@ -80,7 +80,7 @@ class FrequencyKeys(Keys):
     unit: Annotated[str, UNIT] = ""
 
     def lines(self) -> FloatArray:
-        """Return the frequency lines, Hz; raises FileContentError."""
+        """Return the frequency lines, Hz; raise FileContentError if they are invalid."""
         if self.from_file is not None:
             return self._lines_of_file()
         if lacking := [name for name in ("first", "last", "step") if getattr(self, name) is None]:
@@ -137,7 +137,7 @@ class StudyKeys(Keys):
 
 
 class CaseKeys(Keys, tag_field="kind"):
-    """What every case says."""
+    """Keys of every case."""
 
     title: Annotated[str, key("Title of the report.", example="A case of my own")]
     section: Annotated[str, key("Where the source treats the case.", example="none")] = "none"
@@ -158,25 +158,25 @@ class ExpectedFrequencies(Keys):
 
     source: Annotated[str, key("Where the numbers come from.")]
     values: Annotated[tuple[float, ...], key("Natural frequencies of the assembly, lowest first.", "Hz")]
-    within_percent: Annotated[NotNegative, key("How far the computed ones may lie from them.", "%")]
+    within_percent: Annotated[NotNegative, key("Largest difference of the computed frequencies.", "%")]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """What every case says, of whatever kind.
+    """Case with the content that all kinds share.
 
     Attributes
     ----------
     folder : Path
         Folder of the case.
     title, section : str
-        What it is, and where the source treats it.
+        Title of the case, and its section in the source.
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequency lines, Hz.
     realisations, seed : int
-        Realisations of the noise, and the seed they come from.
+        Number of realisations of each noise, and their seed.
     figure_numbers : mapping of str to str
-        Figure to its number in the source.
+        Number in the source of each figure.
     """
 
     folder: Path
@@ -195,18 +195,18 @@ class Case:
 
 @dataclass(frozen=True)
 class Observed:
-    """An FRF of the assembly that is looked at: response and force at one DOF of an internal point.
+    """Observed FRF of the assembly, with response and force at one DOF of an internal point.
 
     Attributes
     ----------
     key : str
-        "r" or "s", and the direction where a case names some: "s-Fx".
+        Name of the FRF: "r" or "s", with the direction if the case has directions, such as "s-Fx".
     point : str
-        "r" or "s".
+        Internal point, "r" or "s".
     dof : int
-        DOF of the point, in the order of the joint's.
+        DOF of the point, in the order of the joint DOFs.
     bands : tuple of (low, high)
-        Where errors of regenerated FRFs are counted, Hz; all lines if empty.
+        Bands in which errors of regenerated FRFs are counted, Hz; all lines if empty.
     """
 
     key: str
@@ -228,9 +228,9 @@ class BandSet:
         Parameters
         ----------
         freq_hz : ndarray, shape (n_freq,)
-            Hz.
+            Frequency lines, Hz.
         k_joint : ndarray, shape (..., n_freq, n, n)
-            K*(w) of any number of realisations, N/m.
+            Dynamic stiffness K*(w) of any number of realisations, N/m.
 
         Returns
         -------
@@ -257,7 +257,7 @@ class BandKeys(Keys):
     ] = field(default_factory=dict)  # fmt: skip
 
     def band_set(self, dofs: Sequence[str], freq_hz: FloatArray) -> BandSet:
-        """Return the bands of all parameters of a joint; raises FileContentError."""
+        """Return the bands of all parameters of a joint; raise FileContentError if they are invalid."""
         names = [parameter.name for parameter in joint_parameters(dofs)]
         for name in self.by_parameter:
             if name not in names:
@@ -291,21 +291,21 @@ class Noise(Keys):
     ]  # fmt: skip
 
     def pollute(self, h: ComplexArray, seed: int, realisation: int = 0) -> ComplexArray:
-        """Add one realisation of the noise to FRFs, shape (n_freq, n, n)."""
+        """Return FRFs with one realisation of the noise, shape (n_freq, n, n)."""
         return pollute(
             h, self.level, self.kind, seed, relative_to=self.relative_to, reciprocal=self.reciprocal,
             block=self.block, realisation=realisation,
         )  # fmt: skip
 
     def realisations(self, h: ComplexArray, seed: int, first: int, count: int) -> ComplexArray:
-        """Add several realisations of the noise to FRFs, shape (count, n_freq, n, n)."""
+        """Return FRFs with several realisations of the noise, shape (count, n_freq, n, n)."""
         return realisations(
             h, self.level, self.kind, seed, relative_to=self.relative_to, reciprocal=self.reciprocal,
             block=self.block, first=first, count=count,
         )  # fmt: skip
 
     def variance(self, h: ComplexArray) -> FloatArray:
-        """Return E|e|^2 of FRFs, shape (n_freq, n, n)."""
+        """Return the variance E|e|^2 of the noise of FRFs, shape (n_freq, n, n)."""
         size: FloatArray = np.abs(h)
         if self.relative_to != "entry":
             own = (1, 2) if self.relative_to == "line" else (0, 1, 2)
@@ -335,13 +335,13 @@ class JointDofKeys(Keys):
 
 
 class WithActualJoint:
-    """What has an actual joint, without cross terms, that is to be found."""
+    """Case with a known actual joint without cross terms."""
 
     joint: Joint
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Stiffness of every DOF, then damping."""
+        """Parameters of the joint: stiffness of every DOF, then damping."""
         return joint_parameters(self.joint.dofs)
 
     @property
@@ -351,19 +351,19 @@ class WithActualJoint:
 
 
 def constant_joint(theta: FloatArray, freq_hz: FloatArray) -> ComplexArray:
-    """K*(w) = k + i w c of uncoupled joint DOFs, for any number of sets of constants.
+    """Return K*(w) = k + i w c of uncoupled joint DOFs, for any number of sets of constants.
 
     Parameters
     ----------
     theta : ndarray, shape (..., 2 n)
         Stiffness of all DOFs, then damping.
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequency lines, Hz.
 
     Returns
     -------
     ndarray, shape (..., n_freq, n, n)
-        N/m, rotational N m/rad.
+        Dynamic stiffness, N/m, rotational N m/rad.
     """
     n = theta.shape[-1] // 2
     diagonal: ComplexArray = theta[..., None, :n] + 2j * np.pi * freq_hz[:, None] * theta[..., None, n:]
@@ -371,13 +371,18 @@ def constant_joint(theta: FloatArray, freq_hz: FloatArray) -> ComplexArray:
 
 
 def joints_of(dofs: Sequence[JointDofKeys], needed_by: str = "") -> tuple[Joint, Joint]:
-    """Return a joint and its first estimate, which is the actual joint unless something needs it.
+    """Return a joint and its first estimate; values without a first estimate are the actual values.
 
     Parameters
     ----------
     dofs : sequence of JointDofKeys
+        Keys of all joint DOFs.
     needed_by : str
-        What needs the first estimate; empty if nothing does.
+        Name of the method that needs the first estimate, default "" for none. It makes first estimates required.
+
+    Returns
+    -------
+    actual, initial : Joint
     """
     for one in dofs:
         named = "rotation" if is_rotation(one.dof) else "translation"
@@ -396,19 +401,19 @@ def joints_of(dofs: Sequence[JointDofKeys], needed_by: str = "") -> tuple[Joint,
 
 
 def check_bands(keys: Keys, name: str, bands: Sequence[Band], freq_hz: FloatArray) -> None:
-    """Raise an error if a band holds no frequency line."""
+    """Raise an error if a band contains no frequency line."""
     if bands:
         keys.build(lambda: in_bands(freq_hz, bands), name)
 
 
 def check_different(keys: Keys, name: str, words: Collection[str], what: str = "have the same name") -> None:
-    """Raise an error where two tables of an array say the same."""
+    """Raise an error if two tables of an array are equal in a key."""
     if len(set(words)) < len(words):
         raise keys.wrong(name, f"two tables [[{name}]] {what}")
 
 
 def check_noises(keys: Keys, noises: Sequence[Noise], n: int) -> None:
-    """Check the tables [[noise]] of a case with n joint DOFs."""
+    """Raise an error if the tables [[noise]] of a case with n joint DOFs are invalid."""
     check_different(keys, "noise", [noise.name for noise in noises])
     for noise in noises:
         if noise.level > _HIGH_LEVEL and not noise.confirm_level:

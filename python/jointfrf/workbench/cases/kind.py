@@ -36,9 +36,9 @@ class Estimates(NamedTuple):
     Attributes
     ----------
     values : ndarray, shape (count, n_columns)
-        In the units of the columns.
+        Estimates in the units of the columns.
     low, high : ndarray, shape (count, n_columns)
-        Limits of the intervals of 95 %; NaN without intervals.
+        Limits of the 95 % intervals; NaN without intervals.
     """
 
     values: FloatArray
@@ -47,31 +47,32 @@ class Estimates(NamedTuple):
 
     @classmethod
     def without_intervals(cls, values: FloatArray) -> Estimates:
-        """Return values of an estimator that gives no intervals."""
+        """Return estimates of an estimator without intervals."""
         missing = np.full(values.shape, np.nan)
         return cls(values, missing, missing)
 
 
-#: Called with the number of the first realisation and how many. Realisation k does not depend on the others of a
-#: call; the object can be sent to another process.
+#: Function of the number of the first realisation and the count. Realisation k does not depend on other realisations
+#: of a call; the object can be sent to another process.
 RealisationSource = Callable[[int, int], Estimates]
 
-#: An estimator of the user: lines, Hz, FRFs at the joint DOFs j, then k, and names of the joint DOFs to stiffness of
-#: all DOFs, then damping.
+#: Estimator of the user: a function of the frequency lines, Hz, FRFs at the joint DOFs j, then k, and names of the
+#: joint DOFs that returns stiffness of all DOFs, then damping.
 Estimator = Callable[[FloatArray, ComplexArray, tuple[str, ...]], FloatArray]
 
 
 @dataclass(frozen=True)
 class EstimateColumn:
-    """One parameter by one estimator.
+    """Column of estimates: one parameter by one estimator.
 
     Attributes
     ----------
     estimator, parameter, unit : str
+        Names of the estimator and of the parameter, and unit of the parameter.
     actual : float
-        NaN if it is unknown.
+        Actual value; NaN if unknown.
     bound : float
-        Least standard deviation of an unbiased estimate (Cramer-Rao), NaN if it is unknown.
+        Least standard deviation of an unbiased estimate (Cramer-Rao); NaN if unknown.
     """
 
     estimator: str
@@ -83,20 +84,21 @@ class EstimateColumn:
 
 @dataclass(frozen=True)
 class EstimateGroup:
-    """Estimates that come from the same FRFs by one method.
+    """Group of estimates from the same FRFs by one method.
 
     Attributes
     ----------
     noise, method : str
-        Names.
+        Names of the noise and of the method.
     columns : tuple of EstimateColumn
+        Columns of the estimates.
     source : callable
-        Gives the estimates of realisations, see `RealisationSource`.
+        Function that returns the estimates of realisations, see `RealisationSource`.
     side_by_side : int
-        Realisations that are best computed in one call.
+        Best number of realisations in one call, default 1.
     details : callable, optional
-        Called like `source`, in its place for the report of a case: it also returns a list, with one object for each
-        realisation that has further results (K* line by line, for figures).
+        Function with the arguments of `source`, used for the report of a case. In addition to estimates, it returns a
+        list with further results of some realisations, such as K* line by line for figures.
     """
 
     noise: str
@@ -108,7 +110,7 @@ class EstimateGroup:
 
 
 class GroupEstimates(NamedTuple):
-    """Estimates of all realisations of a group, and the further results of some; see `EstimateGroup`."""
+    """Estimates of all realisations of a group, and further results of some realisations; see `EstimateGroup`."""
 
     group: EstimateGroup
     estimates: Estimates
@@ -122,13 +124,13 @@ class StudyChoice:
     Attributes
     ----------
     noises : tuple of str
-        Names; all noises of the case if empty.
+        Names of noises; all noises of the case if empty.
     estimators : tuple of str
-        Methods of the kind; those that the case names for each noise if empty.
+        Methods of the kind; if empty, the methods of each noise of the case.
     own_estimators : mapping of str to callable
-        See `Estimator`.
+        Estimators of the user, see `Estimator`.
     own_noises : mapping of str to callable
-        See `Pollution`; in the place of the noises of the case.
+        Noises of the user, see `Pollution`; they replace the noises of the case.
     """
 
     noises: tuple[str, ...] = ()
@@ -137,17 +139,17 @@ class StudyChoice:
     own_noises: Mapping[str, Pollution] = field(default_factory=dict)
 
 
-#: Noise of the user: exact FRFs, seed and number of the realisation to FRFs with noise.
+#: Noise of the user: a function of exact FRFs, seed and number of the realisation that returns FRFs with noise.
 Pollution = Callable[[ComplexArray, int, int], ComplexArray]
 
 
 def chosen_noises(noises: Sequence[Noise], choice: StudyChoice) -> list[Noise]:
-    """Return the noises of a case that a study takes.
+    """Return the noises of a case in a study.
 
     Raises
     ------
     ValueError
-        The case has no noise of such a name.
+        The case has no noise of this name.
     """
     names = [noise.name for noise in noises]
     for name in choice.noises:
@@ -163,18 +165,20 @@ ResultT = TypeVar("ResultT")
 
 @dataclass(frozen=True)
 class Computed(Generic[CaseT, FrfsT]):
-    """A case whose realisations are under way.
+    """Case whose estimates are being computed.
 
     Attributes
     ----------
     case : Case
+        Case with its keys.
     frfs : object
-        FRFs without noise, as `CaseKind.frfs` returned them.
+        FRFs without noise, the result of `CaseKind.frfs`.
     n_realisations : int
+        Number of realisations of each noise.
     estimates : callable
-        Waits for the estimates of all groups.
+        Function that waits for the estimates of all groups and returns them.
     workers : Workers
-        Processes that share further work.
+        Processes for further work.
     """
 
     case: CaseT
@@ -186,7 +190,7 @@ class Computed(Generic[CaseT, FrfsT]):
 
 @dataclass(frozen=True, kw_only=True)
 class CaseKind(Generic[CaseT, FrfsT, ResultT]):
-    """A kind of case: how to read one, and the steps from its structure to tables (`jointfrf.workbench.cases.run`).
+    """Kind of case: reading, and the steps from structure to tables (`jointfrf.workbench.cases.run`).
 
     Attributes
     ----------
@@ -195,31 +199,35 @@ class CaseKind(Generic[CaseT, FrfsT, ResultT]):
     expected_keys : type
         Keys of `expected.toml`.
     read : callable
-        ``read(common, keys, expected)`` returns the case: `common` is the part that all kinds share, `keys` and
-        `expected` are the files, of the classes above. It raises FileContentError.
+        Function ``read(common, keys, expected)`` that returns the case, or raises FileContentError. `common` is the
+        part that all kinds share; `keys` and `expected` are the contents of the files, of the classes above.
     frfs : callable
-        ``frfs(case)`` returns the FRFs of the structure without noise.
+        Function ``frfs(case)`` that returns the FRFs of the structure without noise.
     methods : tuple of str
-        Names of the estimators that a study may take.
+        Names of the estimators of studies.
     takes_functions : bool
-        Whether a study may take estimators and noises of the user.
+        Whether studies accept estimators and noises of the user, default False.
     groups : callable
-        ``groups(case, frfs, choice)`` returns the methods that are applied to realisations of noise, see
-        `EstimateGroup`: the methods of a study, or without a choice (None) the methods of the report of the case.
+        Function ``groups(case, frfs, choice)`` that returns a list of `EstimateGroup`: the methods of a study, or the
+        methods of the report of the case if `choice` is None.
     result : callable
-        ``result(computed)`` returns the result, a class of the kind, from a `Computed`.
+        Function ``result(computed)`` that returns the result, a class of the kind, from a `Computed`.
     tables : callable
-        ``tables(result)``, in the order in which they are shown.
+        Function ``tables(result)`` that returns the tables in the order of the report.
     figures : callable
-        ``figures(result)``; their numbers in the source are added afterwards.
+        Function ``figures(result)`` that returns the figures without their numbers in the source.
     summary : callable
-        ``summary(result, tables)`` returns short tables.
+        Function ``summary(result, tables)`` that returns short tables.
     numbers : callable
-        ``numbers(result)`` returns the part of `results.json` that this kind adds.
+        Function ``numbers(result)`` that returns the part of `results.json` from this kind.
     not_printed : tuple of str
-        Keys of tables that the report has but that are not printed.
+        Keys of tables that appear only in the report.
     headline : tuple of str
-        Keys of figures: the first of them that exists is shown before the tables of the report.
+        Keys of figures; the first existing figure appears before the tables of the report.
+
+    See Also
+    --------
+    jointfrf.workbench.cases.run.run_case : Computation and report of a case.
 
     Examples
     --------
@@ -245,16 +253,16 @@ class CaseKind(Generic[CaseT, FrfsT, ResultT]):
 
     @property
     def name(self) -> str:
-        """The value of `kind` in `case.toml`."""
+        """Value of `kind` in `case.toml`."""
         return str(self.keys.__struct_config__.tag)
 
     def study_groups(self, case: CaseT, choice: StudyChoice) -> list[EstimateGroup]:
-        """Return the estimates of a study of a case.
+        """Return the groups of estimates of a study of a case.
 
         Raises
         ------
         ValueError
-            The case has no such noise or estimator, or takes no functions.
+            The case has no such noise or estimator, or accepts no functions of the user.
         """
         if not self.takes_functions and (choice.own_estimators or choice.own_noises):
             raise ValueError(f"own estimator or noise in a case of kind {self.name}; use a case of kind known-joint")

@@ -1,4 +1,4 @@
-"""One way from a case to its results: structure, FRFs without noise, realisations, methods, tables and figures."""
+"""Computation and report of a case: FRFs without noise, realisations, methods, tables and figures."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from jointfrf.workbench.report.table import Table, plain_rows, shown, table_csv
 
 __all__ = ["CaseOutput", "begin_estimates", "compute_case", "numbered", "run_case", "write_results"]
 
-#: Bytes of memory of a realisation of the noise, chunks and estimates included.
+#: Memory of a realisation of the noise, including chunks and estimates, bytes.
 _REALISATION = 1_000
-#: Tasks of a group at least, if it has as many realisations: all processes end at about the same time.
+#: Least number of tasks of a group with as many realisations, so that all processes end at about the same time.
 _TASKS = 32
 
 CaseT = TypeVar("CaseT", bound=Case)
@@ -43,16 +43,23 @@ def compute_case(
     Parameters
     ----------
     kind : CaseKind
+        Kind of the case.
     case : Case
+        Case of this kind.
     n_realisations : int
-        Realisations of each noise. A realisation depends on the seed and its own number, whatever the processes.
+        Number of realisations of each noise. A realisation depends only on the seed and its own number, not on the
+        number of processes.
     workers : Workers, optional
-        Processes that share the work; this process by default.
+        Worker processes; this process by default.
 
     Returns
     -------
     object
         Result of the class that the kind defines.
+
+    See Also
+    --------
+    run_case : Computation and report of a case.
     """
     at_work = workers or Workers()
     frfs = at_work.begin(kind.frfs, case)()
@@ -63,7 +70,7 @@ def compute_case(
 def begin_estimates(
     groups: Sequence[EstimateGroup], count: int, workers: Workers
 ) -> Callable[[], list[GroupEstimates]]:
-    """Start the estimates of groups from realisations; return a function that waits for them."""
+    """Start the estimates of groups from realisations, and return a function that waits for them."""
     parts = []
     for number, group in enumerate(groups):
         size = group.side_by_side * max(1, count // (_TASKS * group.side_by_side))
@@ -98,16 +105,19 @@ class CaseOutput:
     Attributes
     ----------
     case : Case
+        Case with its keys.
     result : object
-        As `compute_case` returned it.
+        Result of `compute_case`.
     tables : list of Table
+        All tables of the report.
     figures : list of Figure
+        All figures of the report.
     summary : list of Table
         Short tables of the outcome.
     report : Path
-        The HTML report; CSV, SVG and JSON files are in the same folder.
+        Path of the HTML report; CSV, SVG and JSON files are in the same folder.
     printed : list of Table
-        The tables that are worth printing.
+        Tables for the terminal.
     """
 
     case: Case
@@ -120,13 +130,13 @@ class CaseOutput:
 
 
 def numbered(case: Case, figures: Sequence[Figure]) -> list[Figure]:
-    """Give figures their numbers in the source and its order; those that have none follow as they are."""
+    """Return figures with their numbers in the source, in the order of the source, then figures without a number."""
     named = [replace(figure, number=case.figure_numbers.get(figure.key, "")) for figure in figures]
     return sorted(named, key=lambda figure: (not figure.number, _number_key(figure.number)))
 
 
 def _number_key(number: str) -> list[tuple[int, str]]:
-    """Order "3-9a", "3-9b", "3-10", "4-32 and 4-33" in the order of the source."""
+    """Return the key that sorts "3-9a", "3-9b", "3-10", "4-32 and 4-33" in the order of the source."""
     return [(int(digits), letter) for digits, letter in re.findall(r"(\d+)([a-z]?)", number)]
 
 
@@ -140,25 +150,25 @@ def run_case(
     workers: Workers | None = None,
     show: Callable[[Case, list[Table]], None] = lambda case, tables: None,
 ) -> CaseOutput:
-    """Run a case and write its report, tables and figures.
+    """Compute a case, write its report, tables and figures, and return them.
 
     Parameters
     ----------
     folder : Path or str
         Folder with `case.toml`.
     out : Path or str
-        Results go to a folder with the case's name in there: `report.html`, `results.json`, `tables/*.csv`,
-        `figures/*.svg` and `figures/*.csv`.
+        Folder for the results, default "results". A subfolder with the name of the case gets `report.html`,
+        `results.json`, `tables/*.csv`, `figures/*.svg` and `figures/*.csv`.
     realisations : int, optional
-        Number of realisations, default the number that the case names.
+        Number of realisations, default the number in `case.toml`.
     at_most : int, optional
-        Largest number of realisations.
+        Largest number of realisations, no limit by default.
     png : bool
-        Whether to write `figures/*.png`, too.
+        Whether to write `figures/*.png`, too, default False.
     workers : Workers, optional
-        Processes that share the work, see `jointfrf.workbench.cases.workers.started_workers`; this process by default.
+        Worker processes, see `jointfrf.workbench.cases.workers.started_workers`; this process by default.
     show : callable, optional
-        Called with the case and its tables that are worth printing, the summary first, before figures are drawn.
+        Function called before figures are drawn, with the case and its tables for the terminal, the summary first.
 
     Returns
     -------
@@ -167,9 +177,14 @@ def run_case(
     Raises
     ------
     FileContentError
-        Something in the case is missing or wrong.
+        Missing or invalid content of the case.
     OSError
         The results cannot be written.
+
+    See Also
+    --------
+    compute_case : Computation without a report.
+    jointfrf.workbench.cases.catalogue.find_case : Folder of a case.
     """
     for name, number in (("realisations", realisations), ("at_most", at_most)):
         if number is not None and number < 1:
@@ -201,7 +216,7 @@ def run_case(
 def _sections(
     case: Case, headlines: Sequence[str], pictures: Sequence[Picture], summary: list[Table], tables: list[Table]
 ) -> list[Section]:
-    """Return the sections of the page of a case; the first figure there is of `headlines` stands in the summary."""
+    """Return the sections of the page of a case; the summary contains the first existing figure of `headlines`."""
     keys = [one.figure.key for one in pictures]
     first = [pictures[keys.index(key)] for key in headlines if key in keys][:1]
     verdict = verdict_sentence(summary)
@@ -215,7 +230,7 @@ def _sections(
 
 
 def write_results(folder: OwnFolder, document: Document, tables: Sequence[Table], content: Mapping[str, Any]) -> Path:
-    """Write a page and, beside it, its figures, tables and numbers; return the path of the page."""
+    """Write a page, its figures, tables and numbers to one folder, and return the path of the page."""
     drawings, numbers = (folder / "figures").make(), (folder / "tables").make()
     for figure, (png, svg) in (part for part in document.parts if isinstance(part, Picture)):
         for suffix, text in ((".png", png), (".svg", svg), (".csv", figure_csv(figure))):
@@ -229,7 +244,7 @@ def write_results(folder: OwnFolder, document: Document, tables: Sequence[Table]
 
 def _about(case: Case, count: int) -> str:
     freq = case.freq_hz
-    # A case of the user's own has no section of a source.
+    # A case of the user has no section of a source.
     where = f"Section {case.section}. " if case.section[:1].isdigit() else ""
     return (
         f"{where}{count} realisations of each noise level, seed {case.seed}; "
@@ -238,7 +253,7 @@ def _about(case: Case, count: int) -> str:
 
 
 def _text(folder: Path, name: str) -> str:
-    """Return a text of the folder of a case, for its page; not that of another folder, by a link."""
+    """Return a text of the folder of a case for its page; links to other folders are ignored."""
     if not (folder / name).is_file() or (folder / name).is_symlink():
         return ""
     with OwnFolder(folder).opened(name) as file:
@@ -246,7 +261,7 @@ def _text(folder: Path, name: str) -> str:
 
 
 def _common_numbers(case: Case, count: int, tables: list[Table]) -> dict[str, Any]:
-    """Return what the JSON of every kind of case begins with, and its tables."""
+    """Return the numbers of every kind of case for JSON, with the tables."""
     return {
         "case": case.name,
         "title": case.title,

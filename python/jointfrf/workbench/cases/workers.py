@@ -1,4 +1,4 @@
-"""Processes that share the work of cases, of which several are under way at the same time."""
+"""Worker processes for several cases at the same time."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from jointfrf.parallel.pool import started_processes
 __all__ = ["RankedProcesses", "Workers", "silent", "started_workers"]
 
 _T = TypeVar("_T")
-#: What limits the threads of the libraries that a process calls.
+#: Environment variables that limit the threads of numerical libraries.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-#: Tasks that are handed out, for each process: none of them waits for the next.
+#: Number of submitted tasks for each process, so that no process waits for its next task.
 _HANDED_OUT = 2
 
 
@@ -28,12 +28,16 @@ def silent(done: int, total: int) -> None:
 
 
 class RankedProcesses:
-    """Processes that do the tasks of the lowest rank first, those of one rank in the order they come in.
+    """Processes that run tasks in the order of their rank, lowest first; tasks of equal rank in order of submission.
 
     Parameters
     ----------
     jobs : int
-        How many; each computes on one thread, since two pools of threads on the same cores slow each other down.
+        Number of processes. Each process uses one thread, because thread pools on the same cores slow each other down.
+
+    See Also
+    --------
+    started_workers : Processes in a context.
     """
 
     def __init__(self, jobs: int) -> None:
@@ -43,7 +47,7 @@ class RankedProcesses:
         self._numbers, self._lock = count(), Lock()
 
     def submit(self, rank: int, function: Callable[..., _T], *arguments: Any) -> Future[_T]:
-        """Call a function in one of the processes, as soon as no task of a lower rank waits."""
+        """Return the future of a function call in one of the processes; tasks of lower rank run first."""
         future: Future[_T] = Future()
         with self._lock:
             heapq.heappush(self._waiting, (rank, next(self._numbers), future, function, arguments))
@@ -51,7 +55,7 @@ class RankedProcesses:
         return future
 
     def shutdown(self) -> None:
-        """End the processes when the tasks at work are done; those that wait are cancelled."""
+        """End the processes after their current tasks; cancel waiting tasks."""
         with self._lock:
             waiting, self._waiting = self._waiting, []
         for _, _, future, _, _ in waiting:
@@ -95,20 +99,24 @@ class RankedProcesses:
 
 @dataclass(frozen=True)
 class Workers:
-    """Where the parts of a computation run, and what reports how many are done.
+    """Processes for the parts of a computation, and a function that reports progress.
 
     Attributes
     ----------
     pool : RankedProcesses or None
-        Processes; None for this one.
+        Worker processes; None (default) runs all parts in this process.
     progress : callable
-        Called with the numbers of parts done and in all.
+        Function called with the number of completed parts and the number of all parts.
     rank : int
-        Of the computation among others that share the processes: the lowest is done first.
-    turn : Lock
-        Threads of this process that compute, one for each of the computations that share the processes, take turns:
-        a thread holds it while it computes and lets go of it while it waits for processes. What holds for the whole
-        process, such as filters of warnings, is then never changed by two.
+        Rank of the computation among all computations with the same processes, default 0; the lowest runs first.
+    turn : Lock or None
+        Lock of the threads of this process, if several computations use the same processes. A thread owns the lock
+        while it computes, and releases it while it waits for a process. Global state of the process, such as filters of
+        warnings, is therefore changed by one thread at a time.
+
+    See Also
+    --------
+    started_workers : Workers in a context.
     """
 
     pool: RankedProcesses | None = None
@@ -117,25 +125,25 @@ class Workers:
     turn: Lock | None = field(default=None, compare=False)
 
     def map(self, function: Callable[..., _T], *arguments: Iterable[Any]) -> Iterator[_T]:
-        """Call a function for each set of arguments; results come in order, without processes one at a time."""
+        """Return the results of a function for each set of arguments, in order."""
         if self.pool is None:
             return map(function, *arguments)
         pool, rank = self.pool, self.rank
         return self._results(deque(pool.submit(rank, function, *each) for each in zip(*arguments, strict=False)))
 
     def begin(self, function: Callable[..., _T], *arguments: Any) -> Callable[[], _T]:
-        """Call a function and go on; return what waits for its result, and without processes computes it then."""
+        """Start a function call and return a function that waits for its result (without processes: computes it)."""
         results = self.map(function, *([one] for one in arguments))
         return lambda: next(results)
 
     def counted(self, parts: Iterable[_T], total: int) -> Iterator[_T]:
-        """Pass parts on and report the progress."""
+        """Yield parts and report the progress."""
         for done, part in enumerate(parts, 1):
             yield part
             self.progress(done, total)
 
     def _results(self, futures: deque[Future[_T]]) -> Iterator[_T]:
-        """Give results in order; each is forgotten here when it is given."""
+        """Yield results in order, and drop each result after it is yielded."""
         try:
             while futures:
                 self._wait(futures[0])
@@ -145,7 +153,7 @@ class Workers:
                 future.cancel()
 
     def _wait(self, future: Future[Any]) -> None:
-        """Let others compute while a result is not there."""
+        """Wait for a result; other threads compute meanwhile."""
         if self.turn is None or future.done():
             wait([future])
             return
@@ -158,7 +166,7 @@ class Workers:
 
 @contextmanager
 def started_workers(jobs: int) -> Iterator[Workers]:
-    """Start processes; with one job all is computed in this process."""
+    """Yield workers with a number of processes; one job runs in this process."""
     if jobs <= 1:
         yield Workers()
         return

@@ -18,7 +18,7 @@ __all__ = ["Formulation", "Mass", "Material", "assemble_bricks", "brick_quality"
 Formulation = Literal["reduced", "incompatible", "full"]
 Mass = Literal["consistent", "lumped"]
 
-#: Letters by which the kernel knows the formulations.
+#: Letters of the formulations in calls of the kernel.
 _LETTERS: Final[dict[Formulation, str]] = {"reduced": "R", "incompatible": "I", "full": "F"}
 #: Status of the kernel for an element whose matrices overflow.
 _OVERFLOW = -2
@@ -33,18 +33,24 @@ class Material:
     Parameters
     ----------
     youngs_modulus : float
-        N/m^2.
+        Young's modulus, N/m^2.
     poisson : float
         Poisson's ratio, between -1 and 0.5.
     density : float
-        kg/m^3.
+        Density, kg/m^3.
     loss_factor : float
-        Structural damping, K (1 + i eta). The real matrices of this module leave it out.
+        Loss factor eta of the structural damping, K (1 + i eta), default 0. The real matrices of this module do not
+        contain it.
 
     Raises
     ------
     ValueError
         A value that is out of range.
+
+    See Also
+    --------
+    assemble_bricks : Matrices of a mesh.
+    jointfrf.workbench.solids.solid.solid_model : Model of a mesh, with damping.
 
     Examples
     --------
@@ -75,33 +81,38 @@ def element_matrices(
     hourglass: float = 0.005,
     mass: Mass = "consistent",
 ) -> tuple[FloatArray, FloatArray]:
-    """Stiffness and mass of eight-node bricks.
+    """Return stiffness and mass matrices of eight-node bricks.
 
     Parameters
     ----------
     coordinates : array_like, shape (n_elements, 8, 3)
-        Nodes of each element, m. Nodes 1 to 4 go round one face, counter-clockwise as seen from the opposite face; 5 to
-        8 lie there, 5 over 1: the order of C3D8 of Abaqus and CalculiX and of the hexahedron of VTK.
+        Coordinates of the nodes of each element, m. The order is the order of C3D8 in Abaqus and CalculiX and of the
+        hexahedron in VTK. Nodes 1 to 4 run around one face, counter-clockwise as seen from the opposite face. Nodes 5
+        to 8 run around the opposite face, with node 5 opposite node 1.
     materials : Material, or a sequence with one for each element
+        Materials of the elements.
     formulation : {"incompatible", "reduced", "full"}
+        Formulation of the elements, default "incompatible".
+
         - "incompatible": 2 x 2 x 2 integration points and three quadratic displacements 1 - xi^2 in each direction,
-          condensed; their gradients take the Jacobian of the centre [2]_. Exact in bending as a rectangular brick. The
-          counterpart of C3D8I.
+          condensed. Their gradients use the Jacobian at the centre [2]_. A rectangular brick is exact in bending. The
+          counterpart is C3D8I.
         - "reduced": one strain, the mean over the element, and a stiffness against hourglass patterns [1]_. The bending
-          stiffness of n layers is 1 - 1/n^2 of the exact one; one layer has that of the hourglass control alone. The
-          counterpart of C3D8R.
-        - "full": 2 x 2 x 2 integration points. Far too stiff in bending.
+          stiffness of n layers is 1 - 1/n^2 of the exact stiffness. One layer has no bending stiffness except the
+          hourglass stiffness. The counterpart is C3D8R.
+        - "full": 2 x 2 x 2 integration points. The element is far too stiff in bending.
     hourglass : float
-        Stiffness of the hourglass patterns as a share of the shear modulus, for "reduced"; see Notes.
+        Hourglass stiffness of "reduced" as a fraction of the shear modulus, default 0.005; see Notes.
     mass : {"consistent", "lumped"}
-        From the shape functions, at 2 x 2 x 2 points; or its rows summed into the diagonal.
+        Mass matrix, default "consistent": integrated from the shape functions at 2 x 2 x 2 points. "lumped" sums the
+        rows into the diagonal.
 
     Returns
     -------
     stiffness : ndarray, shape (n_elements, 24, 24)
-        N/m, exactly symmetric. DOFs x, y, z of node 1, then of node 2, ...
+        Stiffness matrices, N/m, exactly symmetric. DOFs are x, y, z of node 1, then of node 2, ...
     mass : ndarray, shape (n_elements, 24, 24)
-        kg, exactly symmetric.
+        Mass matrices, kg, exactly symmetric, with the same DOFs.
 
     Raises
     ------
@@ -111,23 +122,31 @@ def element_matrices(
     OverflowError
         The matrices of an element overflow.
 
+    See Also
+    --------
+    assemble_bricks : Matrices of a mesh.
+    brick_quality : Scaled Jacobian and aspect ratio of bricks.
+
     Notes
     -----
-    Hourglass stiffness of "reduced": ``hourglass`` G V (b : b) / 8 sum gamma gamma^T in each direction, with the volume
-    V, the mean gradients b of the shape functions, and the four patterns gamma = Gamma - b x^T Gamma: Gamma of 1 and
-    -1, made orthogonal to linear displacements. First bending frequency of a cantilever of 0.3 x 0.025 x 0.006 m
-    (70 GPa, 0.33, 2700 kg/m^3; 54.84 Hz by Euler-Bernoulli) with consistent mass, elements over width, height, length:
+    The hourglass stiffness of "reduced" is the same in each direction, with the shear modulus G, the volume V and the
+    mean gradients b of the shape functions::
 
-    ============  ==========================  ======
-    formulation   elements                    Hz
-    ============  ==========================  ======
-    reduced       10 x 1 x 100                6.75
-    reduced       10 x 2 x 100                47.89
-    reduced       10 x 3 x 50                 52.25
-    reduced       10 x 4 x 50                 53.59
-    incompatible  5 x 2 x 103                 55.16
-    full          5 x 2 x 103                 59.30
-    ============  ==========================  ======
+        hourglass G V (b : b) / 8 sum gamma gamma^T
+
+    The sum covers four patterns gamma = Gamma - b x^T Gamma. Their base vectors Gamma contain 1 and -1, and the second
+    term makes the patterns orthogonal to linear displacements.
+
+    The table lists the first bending frequency of a cantilever of 0.3 x 0.025 x 0.006 m (70 GPa, 0.33, 2700 kg/m^3)
+    with consistent mass. Euler-Bernoulli theory gives 54.84 Hz. Elements are counted over width, height and length::
+
+        formulation   elements      Hz
+        reduced       10 x 1 x 100   6.75
+        reduced       10 x 2 x 100  47.89
+        reduced       10 x 3 x 50   52.25
+        reduced       10 x 4 x 50   53.59
+        incompatible  5 x 2 x 103   55.16
+        full          5 x 2 x 103   59.30
 
     References
     ----------
@@ -138,7 +157,7 @@ def element_matrices(
 
     Examples
     --------
-    Pulled along z by a force F, a bar of length l stretches by F l/(E A):
+    A bar of length l under an axial force F stretches by F l/(E A):
 
     >>> import numpy as np
     >>> from jointfrf.workbench.solids.brick import Material, element_matrices
@@ -163,31 +182,42 @@ def assemble_bricks(
     hourglass: float = 0.005,
     mass: Mass = "consistent",
 ) -> tuple[sparse.csr_array, sparse.csr_array]:
-    """Stiffness and mass of a mesh of eight-node bricks.
+    """Return stiffness and mass matrices of a mesh of eight-node bricks.
 
     Parameters
     ----------
     nodes : array_like, shape (n_nodes, 3)
-        m.
+        Coordinates x, y, z of the nodes, m.
     elements : array_like of int, shape (n_elements, 8)
         Nodes of each element, counted from 0, in the order of `element_matrices`.
-    materials, formulation, hourglass, mass
-        As in `element_matrices`.
+    materials : Material, or a sequence with one for each element
+        Materials of the elements.
+    formulation : {"incompatible", "reduced", "full"}
+        Formulation of the elements, default "incompatible"; see `element_matrices`.
+    hourglass : float
+        Hourglass stiffness of "reduced" as a fraction of the shear modulus, default 0.005.
+    mass : {"consistent", "lumped"}
+        Mass matrix, default "consistent".
 
     Returns
     -------
     stiffness, mass : csr_array, shape (3 n_nodes, 3 n_nodes)
-        N/m and kg, exactly symmetric; DOFs x, y, z of node 0, then of node 1, ... Damping, where an element has a loss
-        factor, is the caller's.
+        Stiffness and mass matrix, N/m and kg, exactly symmetric. DOFs are x, y, z of node 0, then of node 1, ... The
+        matrices do not contain the loss factors of the materials.
 
     Raises
     ------
     ValueError, OverflowError
-        As in `element_matrices`; a node that does not exist, or is named twice by an element.
+        Errors of `element_matrices`; a node that does not exist, or is named twice by an element.
+
+    See Also
+    --------
+    jointfrf.workbench.solids.solid.solid_model : Model of a mesh, with damping, supports and reference points.
+    jointfrf.workbench.solids.mesh.extrude : Mesh over the quadrilaterals of a plan.
 
     Notes
     -----
-    Entries between nodes that share no element are not stored.
+    The matrices store no entries between nodes that share no element.
 
     Examples
     --------
@@ -208,25 +238,31 @@ def assemble_bricks(
 
 
 def brick_quality(nodes: ArrayLike, elements: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """How far the bricks of a mesh are from rectangular ones.
+    """Return scaled Jacobian and aspect ratio of the bricks of a mesh.
 
     Parameters
     ----------
-    nodes, elements
-        As in `assemble_bricks`.
+    nodes : array_like, shape (n_nodes, 3)
+        Coordinates x, y, z of the nodes, m.
+    elements : array_like of int, shape (n_elements, 8)
+        Nodes of each element, counted from 0, in the order of `element_matrices`.
 
     Returns
     -------
     scaled_jacobian : ndarray, shape (n_elements,)
-        Volume that the three edges of a corner span over the product of their lengths, the smallest of the eight: 1
-        where all angles are right, not positive where a corner is turned inside out.
+        Volume spanned by the three edges of a corner, divided by the product of their lengths; the smallest value of
+        the eight corners. It is 1 if all angles are right, and not positive if a corner is turned inside out.
     aspect_ratio : ndarray, shape (n_elements,)
-        Longest edge over shortest.
+        Length of the longest edge divided by the length of the shortest.
 
     Raises
     ------
     ValueError
         NaN or Inf among the nodes; a node that does not exist, or is named twice by an element.
+
+    See Also
+    --------
+    element_matrices : Matrices of bricks.
 
     Examples
     --------
@@ -248,7 +284,7 @@ def _element_matrices(
     hourglass: float,
     mass: Mass,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the matrices of elements whose coordinates are checked."""
+    """Return the matrices of elements with valid coordinates."""
     check_choice("formulation", formulation, get_args(Formulation))
     check_choice("mass", mass, get_args(Mass))
     n = len(coordinates)
@@ -298,7 +334,7 @@ def _checked_mesh(nodes: ArrayLike, elements: ArrayLike) -> tuple[FloatArray, ND
             f"elements must be node numbers of shape (n, {_NODES}), not {mesh.dtype} of shape {mesh.shape}"
         )
     if len(mesh) == 0:
-        raise ValueError("elements must hold at least one element")
+        raise ValueError("elements must contain at least one element")
     strange = (mesh < 0) | (mesh >= len(places))
     if strange.any():
         bad, at = np.argwhere(strange)[0]
@@ -314,7 +350,7 @@ def _checked_mesh(nodes: ArrayLike, elements: ArrayLike) -> tuple[FloatArray, ND
 
 
 class _Pairs:
-    """The pairs of nodes that share an element, and their places among the 64 pairs of each element."""
+    """Pairs of nodes that share an element, and their positions among the 64 pairs of each element."""
 
     def __init__(self, mesh: NDArray[np.int64], n_nodes: int) -> None:
         pair = (mesh[:, :, None] * n_nodes + mesh[:, None, :]).ravel()

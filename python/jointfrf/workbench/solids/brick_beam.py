@@ -1,4 +1,4 @@
-"""Straight beams of brick elements, with a bolt hole or without."""
+"""Straight beams of brick elements, with or without a bolt hole."""
 
 from __future__ import annotations
 
@@ -31,23 +31,29 @@ _OUTER_LAYERS = 2
 
 @dataclass(frozen=True)
 class Hole:
-    """Bolt hole through the height of a beam, and the ring under the bolt head that follows a reference point.
+    """Bolt hole through the height of a beam, and the ring under the bolt head that moves with a reference point.
 
     Attributes
     ----------
     position : float
-        From the start of the beam to the axis of the hole, m.
-    radius, patch_radius : float
-        Of the hole and of the ring around it, m.
+        Distance from the start of the beam to the axis of the hole, m.
+    radius : float
+        Radius of the hole, m.
+    patch_radius : float
+        Outer radius of the ring around the hole, m.
     face : {"top", "bottom"}
-        Where the ring lies.
+        Face with the ring, default "top".
     name : str
-        Of the reference point, in the middle of the hole on this face.
+        Name of the reference point at the centre of the hole on this face, default "hole".
 
     Raises
     ------
     ValueError
         NaN or Inf; a face that is not known.
+
+    See Also
+    --------
+    brick_beam : Beam with a hole.
     """
 
     position: float
@@ -76,42 +82,51 @@ def brick_beam(
     divisions: tuple[int, int, int] | None = None,
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> SolidModel:
-    """Straight beam of bricks along z, width along x, height along y.
+    """Return the model of a straight beam of bricks, with its length along z, width along x and height along y.
 
     Parameters
     ----------
     length, width, height : float
-        m.
+        Dimensions of the beam, m.
     material : Material
-        Its loss factor is that of the model.
+        Material of all bricks, and loss factor of the model.
     ends : tuple of {"free", "clamped"}
-        First and last face.
+        Supports of the first and the last face, default both "free".
     hole : Hole, optional
-        Bolt hole; the mesh around it is an O-grid in a square as wide as the beam.
+        Bolt hole; the mesh around it is an O-grid in a square as wide as the beam. No hole by default.
     sections : mapping of str to float, optional
-        Cross-sections that follow a reference point in their middle and stay plane: name to distance from the start,
-        m. The nearest plane of nodes is taken.
+        Rigid cross-sections: name to distance from the start, m. The nearest plane of nodes moves with a reference
+        point at the centre of the section.
     observed : mapping of str to float, optional
-        Cross-sections whose mean motion is observed, and over which forces are spread, without making them stiffer; see
-        `SolidModel.ports`.
+        Flexible cross-sections: name to distance from the start, m. Their mean motion can be observed, and forces are
+        spread over them; see `SolidModel.ports`.
     preset : {"seed", "accurate"}
-        "seed": reduced integration with hourglass control, the counterpart of C3D8R; softer in bending
-        by 1 - 1/n^2 with n bricks over the height. "accurate": incompatible modes, the counterpart of C3D8I.
+        Elements, default "accurate".
+
+        - "seed": reduced integration with hourglass control, the counterpart of C3D8R. With n bricks over the height,
+          the bending stiffness is 1 - 1/n^2 of the exact stiffness.
+        - "accurate": incompatible modes, the counterpart of C3D8I.
     divisions : tuple of int, optional
-        Bricks along x, y and z of a beam without hole, which one with a hole keeps away from it; by default bricks of
-        about half the height.
+        Numbers of bricks along x, y and z. In a beam with a hole, the number along z sets the spacing away from the
+        hole. By default, bricks are about half as long as the beam is high.
     origin : tuple of float
-        x, y, z of the middle of the lower edge of the first face, m: the beam lies at y from `origin[1]` up.
+        Coordinates x, y, z of the middle of the lower edge of the first face, m, default (0, 0, 0). The beam extends
+        from y = `origin[1]` upwards.
 
     Returns
     -------
     SolidModel
-        DOFs ``"node:x"``, then those of the reference points, ``"hole:theta_y"``.
+        Model with the DOFs of the nodes, such as ``"1:x"``, then of the reference points, such as ``"hole:theta_y"``.
 
     Raises
     ------
     ValueError
         A dimension that is not positive; a hole that leaves the beam; patches that overlap.
+
+    See Also
+    --------
+    jointfrf.workbench.solids.solid.solid_model : Model of any mesh.
+    jointfrf.workbench.solids.brick.element_matrices : Formulations of the elements.
 
     Examples
     --------
@@ -179,18 +194,18 @@ def _mesh(length: float, width: float, height: float, hole: Hole | None, divisio
 def holed_plan(
     length: float, width: float, position: float, radii: Sequence[float], divisions: tuple[int, int]
 ) -> Plan:
-    """Plan of a beam with a hole: an O-grid in a square as wide as the beam, or up to its end, and strips beside.
+    """Return the plan of a beam with a hole: an O-grid as wide as the beam, or up to its end, and rectangles.
 
     Parameters
     ----------
     length, width : float
-        m.
+        Dimensions of the beam, m.
     position : float
-        From the start to the axis of the hole, m.
+        Distance from the start of the beam to the axis of the hole, m.
     radii : sequence of float
-        Radius of the hole, then of circles around it, m.
+        Radius of the hole, then radii of the circles around it, m.
     divisions : tuple of int
-        Bricks along x, and along z if the beam had no hole.
+        Numbers of bricks along x and z; the number along z applies to a beam without a hole.
 
     Returns
     -------
@@ -200,6 +215,11 @@ def holed_plan(
     ------
     ValueError
         The hole or a circle around it leaves the beam.
+
+    See Also
+    --------
+    brick_beam : Model of a beam.
+    jointfrf.workbench.solids.mesh.holed_rectangle : O-grid around a hole.
     """
     nx, nz = divisions
     reach = (min(width / 2, position), min(width / 2, length - position), width / 2)
@@ -218,7 +238,7 @@ def holed_plan(
 
 
 def _ring(nodes: FloatArray, hole: Hole, height: float, near: float) -> Patch:
-    """Nodes under the bolt head."""
+    """Return the nodes under the bolt head."""
     y = height if hole.face == "top" else 0.0
     point = np.array([0.0, y, hole.position])
     radius = np.hypot(nodes[:, 0], nodes[:, 2] - hole.position)
@@ -227,7 +247,7 @@ def _ring(nodes: FloatArray, hole: Hole, height: float, near: float) -> Patch:
 
 
 def _section(nodes: FloatArray, name: str, at: float, length: float, height: float, near: float) -> Patch:
-    """Nodes of the cross-section nearest to a place."""
+    """Return the nodes of the cross-section nearest to a place."""
     if not -near <= as_number(f"section {name!r}", at) <= length + near:
         raise ValueError(f"section {name!r} at {1e3 * at:g} mm lies outside the beam of {1e3 * length:g} mm")
     z = nodes[:, 2]

@@ -1,4 +1,4 @@
-"""Structured meshes of eight-node bricks, extruded from plane quadrilaterals; displacements of points between nodes."""
+"""Structured meshes of eight-node bricks, extruded from plane quadrilaterals, and interpolation between their nodes."""
 
 from __future__ import annotations
 
@@ -28,20 +28,26 @@ _FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3
 _CORNERS: Final = np.array([[x, y, z] for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))], float)
 #: Steps of Newton's method in a brick; distorted ones need five.
 _STEPS: Final = 12
-#: Elements tried for each point, nearest centres first, before all are.
+#: Elements searched first for each point, those with the nearest centres; then all elements are searched.
 _FIRST: Final = 16
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Quadrilaterals in the plane of z and x, counter-clockwise there.
+    """Quadrilaterals in the plane of z and x, each counter-clockwise from z to x.
 
     Attributes
     ----------
     points : ndarray, shape (n_points, 2)
-        z and x, m.
+        Coordinates z and x of the points, m.
     quads : ndarray of int, shape (n_quads, 4)
-        Points of each, counted from 0.
+        Points of each quadrilateral, counted from 0.
+
+    See Also
+    --------
+    rectangle, holed_rectangle, disc : Plans of single shapes.
+    join_plans : One plan from several.
+    extrude : Bricks over a plan.
     """
 
     points: FloatArray
@@ -55,9 +61,14 @@ class Mesh:
     Attributes
     ----------
     nodes : ndarray, shape (n_nodes, 3)
-        x, y, z, m.
+        Coordinates x, y, z of the nodes, m.
     elements : ndarray of int, shape (n_elements, 8)
-        Nodes of each, counted from 0: lower face counter-clockwise seen from above, then the upper face.
+        Nodes of each brick, counted from 0: lower face counter-clockwise as seen from above, then the upper face.
+
+    See Also
+    --------
+    extrude : Mesh over the quadrilaterals of a plan.
+    jointfrf.workbench.solids.solid.solid_model : Model of a mesh.
     """
 
     nodes: FloatArray
@@ -74,12 +85,21 @@ class Mesh:
             raise ValueError(f"elements must name nodes 0 to {len(self.nodes) - 1}")
 
     def near(self, point: ArrayLike) -> int:
-        """Return the node at a point.
+        """Return the number of the node at a point, counted from 0.
+
+        Parameters
+        ----------
+        point : array_like, shape (3,)
+            Coordinates x, y, z, m.
+
+        Returns
+        -------
+        int
 
         Raises
         ------
         ValueError
-            There is none.
+            No node lies at the point.
         """
         place = as_real("point", point, (3,))
         distance, found = cKDTree(self.nodes).query(place)
@@ -89,7 +109,15 @@ class Mesh:
         return int(found)
 
     def faces(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Return the outer faces, shape (n_faces, 4), seen counter-clockwise from outside, and their elements."""
+        """Return the outer faces and their elements.
+
+        Returns
+        -------
+        faces : ndarray of int, shape (n_faces, 4)
+            Nodes of each face, counter-clockwise as seen from outside.
+        elements : ndarray of int, shape (n_faces,)
+            Element of each face.
+        """
         every = self.elements[:, _FACES].reshape(-1, 4)
         _, first, count = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_counts=True)
         outer = np.sort(first[count == 1])
@@ -97,16 +125,26 @@ class Mesh:
 
 
 def rectangle(z: ArrayLike, x: ArrayLike) -> Plan:
-    """Rectangle with grid lines at given places.
+    """Return a rectangle with given grid lines.
 
     Parameters
     ----------
     z, x : array_like, shape (n_z,), (n_x,)
-        Ascending, m.
+        Coordinates of the grid lines in ascending order, m.
 
     Returns
     -------
     Plan
+
+    Raises
+    ------
+    ValueError
+        Fewer than two grid lines, or lines that are not in ascending order.
+
+    See Also
+    --------
+    holed_rectangle : Rectangle around a round hole.
+    extrude : Bricks over a plan.
     """
     lines = [as_real(name, value, (None,)) for name, value in (("z", z), ("x", x))]
     for name, line in zip("zx", lines, strict=True):
@@ -121,20 +159,20 @@ def rectangle(z: ArrayLike, x: ArrayLike) -> Plan:
 def holed_rectangle(
     centre: ArrayLike, reach: tuple[float, float, float], radii: Sequence[float], divisions: int, layers: int = 1
 ) -> Plan:
-    """Rectangle around a round hole: rings at given radii, then layers that pass from the circle to the edges.
+    """Return a rectangle around a round hole: rings of given radii, then layers from the last circle to the edges.
 
     Parameters
     ----------
     centre : array_like, shape (2,)
-        z and x of the middle of the hole, m.
+        Coordinates z and x of the centre of the hole, m.
     reach : tuple of float
-        How far the rectangle reaches from there: to lower z, to higher z, and along x to either side, m.
+        Distances from the centre to the edges, m: to lower z, to higher z, and along x on both sides.
     radii : sequence of float
-        Radius of the hole, then of the rings around it, m.
+        Radius of the hole, then radii of the rings around it, m.
     divisions : int
-        Quadrilaterals along an edge.
+        Number of quadrilaterals along an edge.
     layers : int
-        Quadrilaterals from the last circle to the edges.
+        Number of quadrilaterals from the last circle to the edges, default 1.
 
     Returns
     -------
@@ -144,6 +182,11 @@ def holed_rectangle(
     ------
     ValueError
         The circles do not grow, or leave the rectangle; numbers of quadrilaterals below 1.
+
+    See Also
+    --------
+    rectangle : Rectangle without a hole.
+    disc : Disc without a hole.
     """
     as_count("layers", layers)
     if not radii or not _grow([*radii, min(reach)]):
@@ -159,18 +202,18 @@ def holed_rectangle(
 
 
 def disc(centre: ArrayLike, radii: Sequence[float], divisions: int, layers: int = 1) -> Plan:
-    """Disc: a square core, layers from it to the first circle, then rings.
+    """Return a disc: a square core, layers from the core to the first circle, then rings.
 
     Parameters
     ----------
     centre : array_like, shape (2,)
-        z and x of the middle, m.
+        Coordinates z and x of the centre, m.
     radii : sequence of float
-        Ascending, m.
+        Radii of the circles in ascending order, m.
     divisions : int
-        Quadrilaterals along a side of the core.
+        Number of quadrilaterals along a side of the core.
     layers : int
-        Quadrilaterals from the core to the first circle.
+        Number of quadrilaterals from the core to the first circle, default 1.
 
     Returns
     -------
@@ -180,6 +223,11 @@ def disc(centre: ArrayLike, radii: Sequence[float], divisions: int, layers: int 
     ------
     ValueError
         The circles do not grow; numbers of quadrilaterals below 1.
+
+    See Also
+    --------
+    holed_rectangle : Rectangle around a round hole.
+    extrude : Bricks over a plan.
     """
     as_count("layers", layers)
     if not radii or not _grow(radii):
@@ -198,7 +246,7 @@ def _grow(radii: Sequence[float]) -> bool:
 
 
 def _around(divisions: int) -> tuple[FloatArray, FloatArray]:
-    """Points once around, counter-clockwise: on the unit circle, and on the square of half side 1."""
+    """Return points counter-clockwise on the unit circle, and on the square of half side 1."""
     as_count("divisions", divisions)
     along = np.linspace(-1, 1, divisions + 1)[:-1]
     side = np.stack([np.ones(divisions), along], axis=1)
@@ -209,7 +257,7 @@ def _around(divisions: int) -> tuple[FloatArray, FloatArray]:
 
 
 def _rings(centre: FloatArray, rows: Sequence[FloatArray]) -> Plan:
-    """Quadrilaterals between closed rows of points, the innermost first."""
+    """Return the quadrilaterals between closed rows of points, the innermost first."""
     number = np.arange(len(rows) * len(rows[0])).reshape(len(rows), -1)
     after = np.roll(number, -1, axis=1)
     quads = np.stack([number[:-1], number[1:], after[1:], after[:-1]], axis=-1)
@@ -217,7 +265,21 @@ def _rings(centre: FloatArray, rows: Sequence[FloatArray]) -> Plan:
 
 
 def join_plans(*plans: Plan) -> Plan:
-    """One plan of several; points at the same place become one."""
+    """Return one plan from several; points at the same place are merged.
+
+    Parameters
+    ----------
+    *plans : Plan
+        Plans that touch each other.
+
+    Returns
+    -------
+    Plan
+
+    See Also
+    --------
+    extrude : Bricks over several plans.
+    """
     points = np.concatenate([p.points for p in plans])
     starts = np.cumsum([0, *(len(p.points) for p in plans[:-1])])
     quads = np.concatenate([p.quads + start for p, start in zip(plans, starts, strict=True)])
@@ -226,17 +288,27 @@ def join_plans(*plans: Plan) -> Plan:
 
 
 def extrude(*parts: tuple[Plan, ArrayLike]) -> Mesh:
-    """Bricks over the quadrilaterals of plans, between heights y; nodes at the same place become one.
+    """Return bricks over the quadrilaterals of plans, between heights y; nodes at the same place are merged.
 
     Parameters
     ----------
     *parts : (Plan, array_like of shape (n_layers + 1,))
-        Plan and ascending heights, m, of each part of one body.
+        Plan and heights y of the layers of each part of one body; heights ascending, m.
 
     Returns
     -------
     Mesh
-        Layers of a part from the lowest up.
+        Mesh of all parts; within a part, the lowest layer comes first.
+
+    Raises
+    ------
+    ValueError
+        Fewer than two heights, or heights that are not in ascending order.
+
+    See Also
+    --------
+    rectangle, holed_rectangle, disc : Plans.
+    jointfrf.workbench.solids.solid.solid_model : Model of a mesh.
     """
     nodes, elements, start = [], [], 0
     for plan, heights in parts:
@@ -260,10 +332,10 @@ def _extent(points: FloatArray) -> float:
 
 
 def _merged(points: FloatArray) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
-    """Return the new number of every point, and which points are kept, in their order."""
+    """Return the new number of every point, and the old numbers of the points that are kept."""
     pairs = cKDTree(points).query_pairs(_SAME * _extent(points), output_type="ndarray")
     first = np.arange(len(points))
-    # The lower number of a pair stays; pairs of one place all name its lowest point, since all are near each other.
+    # The lower number of a pair is kept. All pairs at one place contain its lowest point.
     np.minimum.at(first, pairs[:, 1], pairs[:, 0])
     kept = np.flatnonzero(first == np.arange(len(points)))
     number = np.full(len(points), -1, np.int32)
@@ -279,39 +351,49 @@ def interpolation(
     elements: ArrayLike | None = None,
     tolerance: float = 1e-6,
 ) -> sparse.csr_array:
-    """Weights that give displacements of points from those of the nodes.
+    """Return the weights that map displacements of the nodes to displacements of points.
 
     Parameters
     ----------
     mesh : Mesh
+        Mesh of bricks.
     points : array_like, shape (n_points, 3)
-        x, y, z, m: inside bricks or on their faces.
-    directions : str, sequence of str, or array_like of shape (m, 3)
-        Of the displacements: a string of axes serves every point, "xyz" gives three rows a point, the points slowest; a
-        sequence holds one of "x", "y", "z" for each point; an array one vector for each point, made a unit vector.
+        Coordinates x, y, z of points inside bricks or on their faces, m.
+    directions : str, sequence of str, or array_like of shape (n_points, 3)
+        Directions of the displacements, default "xyz".
+
+        - A string of axes applies to every point: "xyz" gives three rows for each point, point after point.
+        - A sequence contains one of "x", "y", "z" for each point.
+        - An array contains one vector for each point, which is normalised.
     elements : array_like of int, optional
-        Bricks that are searched, counted from 0: a body, where two of them touch. All by default.
+        Bricks to be searched, counted from 0, such as one of two bodies in contact; all bricks by default.
     tolerance : float
-        How far a point may lie off the bricks, m; the nearest point of a brick is taken for it.
+        Largest distance of a point from the bricks, default 1e-6 m. The nearest point of a brick replaces the point.
 
     Returns
     -------
     csr_array, shape (m, 3 n_nodes)
-        Multiply it with `SolidModel.expansion` for weights of the DOFs of a model.
+        Weights of the nodal displacements, one row for each displacement. Multiply them by `SolidModel.expansion` to
+        get weights of the DOFs of a model.
 
     Raises
     ------
     ValueError
         A point that lies off the bricks, an invalid direction.
 
+    See Also
+    --------
+    jointfrf.workbench.solids.solid.mean_motion : Mean rigid motion of nodes about a point.
+
     Notes
     -----
-    Trilinear functions of the eight nodes; the inner functions of "incompatible" bricks vanish there and are left out.
-    Facets replace round faces: between their nodes a hole is a little narrower than its circle.
+    The weights are the trilinear shape functions of the eight nodes. The internal functions of "incompatible" bricks
+    are zero at the nodes and are left out. Round faces are replaced by facets, so a hole is slightly narrower than its
+    circle between the nodes.
 
     Examples
     --------
-    The middle of the upper face of a brick of 1 x 1 x 2 m follows its four nodes:
+    The centre of the upper face of a brick of 1 x 1 x 2 m depends on the four nodes of this face:
 
     >>> from jointfrf.workbench.solids.mesh import interpolation
     >>> from jointfrf.workbench.solids.mesh import extrude, rectangle
@@ -370,7 +452,7 @@ def _chosen(mesh: Mesh, elements: ArrayLike | None) -> NDArray[np.intp]:
 def _located(
     mesh: Mesh, bricks: NDArray[np.intp], places: FloatArray, tolerance: float
 ) -> tuple[NDArray[np.intp], FloatArray]:
-    """Return for each point the brick that holds it, as a position in `bricks`, and the weights of its nodes."""
+    """Return for each point the brick that contains it, as a position in `bricks`, and the weights of its nodes."""
     tree = cKDTree(mesh.nodes[mesh.elements[bricks]].mean(axis=1))
     best = np.zeros(len(places), np.intp)
     weights = np.zeros((len(places), len(_CORNERS)))
@@ -379,7 +461,7 @@ def _located(
     for count in (min(_FIRST, len(bricks)), len(bricks)):
         for i in left.tolist():
             near = np.atleast_1d(tree.query(places[i], count)[1])
-            near = near[near < len(bricks)]  # none of a point too far away for its distance to be a number
+            near = near[near < len(bricks)]  # empty if the distance of a point overflows
             if not near.size:
                 continue
             functions, off = _nearest(mesh.nodes[mesh.elements[bricks[near]]], places[i])
@@ -395,7 +477,7 @@ def _located(
 
 
 def _nearest(corners: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the shape functions of each brick (n, 8, 3) at its point nearest to a place, about, and how far it is."""
+    """Return shape functions of bricks, shape (n, 8, 3), near the point closest to a place, and its distance."""
     own = np.zeros((len(corners), 3))
     for _ in range(_STEPS):
         factors = 1 + own[:, None, :] * _CORNERS
@@ -403,7 +485,7 @@ def _nearest(corners: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatA
         slopes = np.stack([factors[:, :, a] * factors[:, :, b] for a, b in ((1, 2), (0, 2), (0, 1))], axis=2)
         jacobian = np.einsum("enj,eni->eij", slopes * _CORNERS / 8, corners)
         miss = place - np.einsum("en,eni->ei", functions, corners)
-        # Outside, where the functions may fold over, there is nothing to look for.
+        # Iterates are clipped to the brick because the mapping may be singular outside.
         own = np.clip(own + np.linalg.solve(jacobian, miss[:, :, None])[:, :, 0], -1, 1)
     functions = (1 + own[:, None, :] * _CORNERS).prod(axis=2) / 8
     return functions, np.linalg.norm(place - np.einsum("en,eni->ei", functions, corners), axis=1)

@@ -1,4 +1,4 @@
-"""Models of brick elements: supports, and faces that follow a six-DOF reference point."""
+"""Models of brick elements, with supports and faces that are coupled to six-DOF reference points."""
 
 from __future__ import annotations
 
@@ -17,20 +17,25 @@ from jointfrf.workbench.solids.mesh import Mesh
 
 __all__ = ["Patch", "SolidModel", "mean_motion", "solid_model"]
 
-#: A rotation is not held by a patch whose points stray less than this share of its extent from a line.
+#: A patch cannot fix a rotation if its nodes deviate from a line by less than this fraction of its extent.
 _HELD = 1e-6
 
 
 @dataclass(frozen=True)
 class Patch:
-    """Nodes that follow a reference point as a rigid body, or whose mean motion it shows.
+    """Nodes that are coupled to a reference point: kinematic or distributing coupling.
 
     Attributes
     ----------
     point : ndarray, shape (3,)
-        Reference point, m. It need not be a node.
+        Coordinates x, y, z of the reference point, m. The point need not be a node.
     nodes : ndarray of int
-        Nodes, counted from 0.
+        Numbers of the nodes, counted from 0.
+
+    See Also
+    --------
+    solid_model : Model of a mesh with patches.
+    mean_motion : Mean rigid motion of a patch.
     """
 
     point: FloatArray
@@ -39,15 +44,21 @@ class Patch:
 
 @dataclass(frozen=True, kw_only=True)
 class SolidModel(PointModel):
-    """A model of bricks; DOFs ``"node:x"`` with nodes counted from 1, and ``"name:theta_x"`` of reference points.
+    """Model of bricks, with DOFs ``"1:x"`` of nodes, counted from 1, and ``"name:theta_x"`` of reference points.
 
     Attributes
     ----------
     mesh : Mesh
+        Mesh of the model.
     expansion : sparse array, shape (3 n_nodes, n)
-        Displacements x, y, z of all nodes from the DOFs; zero rows where clamped.
+        Matrix that maps the DOFs to displacements x, y, z of all nodes. Rows of clamped nodes are zero.
     references : mapping of str to ndarray, shape (3,)
-        Reference points, m, those of mean motions included.
+        Coordinates of the reference points, m, including points of mean motions.
+
+    See Also
+    --------
+    solid_model : Model of a mesh.
+    jointfrf.workbench.solids.brick_beam.brick_beam : Model of a straight beam.
     """
 
     mesh: Mesh
@@ -55,7 +66,17 @@ class SolidModel(PointModel):
     references: Mapping[str, FloatArray]
 
     def displacements(self, shape: ArrayLike) -> FloatArray:
-        """Return the displacements of all nodes in a motion of the DOFs, shape (n_nodes, 3)."""
+        """Return the displacements of all nodes.
+
+        Parameters
+        ----------
+        shape : array_like, shape (n,)
+            Displacements of the DOFs.
+
+        Returns
+        -------
+        ndarray, shape (n_nodes, 3)
+        """
         return np.asarray((self.expansion @ np.asarray(shape)).reshape(-1, 3))
 
 
@@ -69,35 +90,44 @@ def solid_model(
     observed: Mapping[str, Patch] | None = None,
     clamped: ArrayLike = (),
 ) -> SolidModel:
-    """Model of a mesh.
+    """Return the model of a mesh.
 
     Parameters
     ----------
     mesh : Mesh
-    materials : Material, or a sequence with one of each element
-        One loss factor for all becomes that of the model, different ones a structural damping matrix.
-    formulation : {"reduced", "incompatible", "full"}
-        Of the elements, see `element_matrices`.
+        Mesh of bricks.
+    materials : Material, or a sequence with one for each element
+        Materials of the elements. If all loss factors are equal, the model has this loss factor; otherwise it has a
+        structural damping matrix.
+    formulation : {"incompatible", "reduced", "full"}
+        Formulation of the elements, default "incompatible"; see `element_matrices`.
     mass : {"consistent", "lumped"}
-        Of the elements.
+        Mass matrix of the elements, default "consistent".
     patches : mapping of str to Patch, optional
-        Reference points by name, which their nodes follow: kinematic coupling.
+        Kinematic coupling: reference points by name. The nodes of a patch move with its point as a rigid body.
     observed : mapping of str to Patch, optional
-        Reference points that show the mean rigid motion of their nodes and spread forces over them, without making
-        them stiffer: distributing coupling. They are no DOFs; see `SolidModel.ports`.
+        Distributing coupling: reference points with the mean rigid motion of their nodes. Forces at the point are
+        spread over the nodes, which stay flexible. The points are no DOFs; see `SolidModel.ports`.
     clamped : array_like of int
-        Nodes held in all directions, counted from 0.
+        Nodes that are fixed in all directions, counted from 0; none by default.
 
     Returns
     -------
     SolidModel
-        Free DOFs of the nodes in their order, then x, y, z, theta_x, theta_y, theta_z of every reference point.
+        Model with the free DOFs of the nodes in their order, then x, y, z, theta_x, theta_y, theta_z of every
+        reference point.
 
     Raises
     ------
     ValueError
         Bad elements; a node that does not exist; a patch that is empty, overlaps another or a clamped node, or does
-        not hold its reference point against every rotation.
+        not fix all rotations of its reference point.
+
+    See Also
+    --------
+    jointfrf.workbench.solids.brick_beam.brick_beam : Model of a straight beam.
+    jointfrf.workbench.solids.brick.assemble_bricks : Matrices of a mesh.
+    jointfrf.workbench.solids.mesh.interpolation : Displacements of points between nodes.
     """
     if not isinstance(mesh, Mesh):
         raise TypeError(f"mesh must be a Mesh, not {type(mesh).__name__}")
@@ -141,18 +171,24 @@ def solid_model(
 
 
 def mean_motion(mesh: Mesh, patch: Patch) -> sparse.csr_array:
-    """Mean rigid motion of nodes about a point, by least squares.
+    """Return the weights of the mean rigid motion of nodes about a point, by least squares.
 
     Parameters
     ----------
     mesh : Mesh
+        Mesh of bricks.
     patch : Patch
+        Nodes and reference point.
 
     Returns
     -------
     sparse array, shape (6, 3 n_nodes)
-        x, y, z, theta_x, theta_y, theta_z from the displacements of all nodes. Transposed, it spreads forces and
-        moments over the nodes of the patch.
+        Weights that map displacements of all nodes to x, y, z, theta_x, theta_y, theta_z of the point. The transpose
+        spreads forces and moments at the point over the nodes of the patch.
+
+    See Also
+    --------
+    jointfrf.workbench.solids.mesh.interpolation : Weights of points between nodes.
     """
     motion = rigid_motion(mesh.nodes[patch.nodes], patch.point).reshape(-1, 6)
     rows, columns = np.arange(6)[:, None], (3 * patch.nodes[:, None].astype(np.int64) + np.arange(3)).ravel()
@@ -162,7 +198,7 @@ def mean_motion(mesh: Mesh, patch: Patch) -> sparse.csr_array:
 
 
 def _as_nodes(name: str, value: ArrayLike, mesh: Mesh) -> NDArray[np.int32]:
-    """Return numbers of nodes that exist."""
+    """Return numbers of nodes if all nodes exist."""
     nodes = as_array(name, value)
     if nodes.ndim != 1 or (nodes.size and nodes.dtype.kind not in "iu"):
         raise TypeError(f"{name} must be a list of node numbers, not {nodes.dtype} of shape {nodes.shape}")
@@ -175,7 +211,7 @@ def _as_nodes(name: str, value: ArrayLike, mesh: Mesh) -> NDArray[np.int32]:
 
 
 def _as_patches(mesh: Mesh, patches: Mapping[str, Patch] | None) -> dict[str, Patch]:
-    """Return patches under names that a DOF may have, each node once."""
+    """Return patches with valid names of DOFs, each with sorted nodes and no duplicates."""
     if not isinstance(patches, Mapping | None):
         raise TypeError(f"patches must map names to patches, not {type(patches).__name__}")
     found = {}
@@ -207,13 +243,13 @@ def _check_shape(mesh: Mesh, name: str, nodes: NDArray[np.int32]) -> None:
     places = mesh.nodes[nodes] - mesh.nodes[nodes].mean(axis=0)
     size = np.linalg.svd(places, compute_uv=False)
     if nodes.size < 3 or size[1] <= _HELD * size[0]:
-        raise ValueError(f"patch {name!r} needs at least three nodes that are not on one line, to hold rotations")
+        raise ValueError(f"patch {name!r} needs at least three nodes that are not on one line, to fix rotations")
 
 
 def _expansion(
     mesh: Mesh, patches: Mapping[str, Patch], clamped: NDArray[np.int32]
 ) -> tuple[sparse.csr_array, tuple[str, ...]]:
-    """Return u = T q, and the names of q."""
+    """Return the matrix T of u = T q, and the names of q."""
     count = len(mesh.nodes)
     free = np.ones(count, bool)
     free[clamped] = False

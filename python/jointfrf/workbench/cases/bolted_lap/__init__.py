@@ -1,12 +1,12 @@
-"""A lap joint with a preloaded bolt of solid elements: measured, identified, and used again with another beam.
+"""A lap joint with a preloaded bolt of solid elements: measurement, identification, and transfer to another beam.
 
-lap          the mesh of two beams and the bolt; the force of the preload
+lap          mesh of two beams and the bolt, and the preload force
 contact      unilateral contact with friction between pairs of nodes
-preload      the tightened state, its contact pressure, the linear model about it
-keys         the keys of its files, and the case as data
-frfs         FRFs: of the preloaded solid model, of the beams by themselves; resonances of the tip
-routes       from measured FRFs to K*(w) by several routes, and to constants by two estimators
-compute      all of these, without noise and with it, for cases and for studies
+preload      static state under preload, its contact pressure, and the linear model about it
+keys         keys of the files, and the case as data
+frfs         FRFs of the preloaded solid model and of the single beams, and resonances of the tip
+routes       K*(w) from measured FRFs by several routes, and constants by two estimators
+compute      results with and without noise, for cases and for studies
 results      tables, numbers and figures
 """
 

@@ -1,4 +1,4 @@
-"""Results of a bolted lap joint: preloaded state, measured FRFs, the identified joint, regenerated FRFs."""
+"""Results of a bolted lap joint: preloaded state, measured FRFs, identified joint, and regenerated FRFs."""
 
 from __future__ import annotations
 
@@ -57,20 +57,21 @@ __all__ = [
     "preloaded_frfs",
 ]
 
-#: K* of the reference points as it is, without constants for the joint.
+#: Name of the estimator that keeps K* of the reference points line by line.
 LINES = "K* line by line, cross terms"
 
 
 class RegeneratedTip(NamedTuple):
-    """FRFs of the tip with an identified joint, with B and with the other B.
+    """FRFs of the tip with an identified joint, with beam B and with the other beam B.
 
     Attributes
     ----------
     found : Found
+        Identified joint.
     h, transferred : ndarray, shape (n_freq, 2)
-        Directions x and y, m/N.
+        FRFs with B and with the other B in the directions x and y, m/N.
     errors, transferred_errors : ResonanceErrors
-        On lines as close as the loss factor asks for.
+        Errors with B and with the other B, on lines that resolve the damping of the peaks.
     """
 
     found: Found
@@ -86,11 +87,13 @@ class Unmeasured(NamedTuple):
     Attributes
     ----------
     name : str
+        Name of the remaining entries.
     k_lines : ndarray, shape (n_freq, 6, 6)
+        K*(w) line by line, N/m.
     theta, fitted : ndarray, shape (12,)
-        Means over bands, and the compliance fit, cross terms ignored.
+        Parameters as means over bands, and by the compliance fit without cross terms.
     shift : ndarray, shape (2,)
-        Largest error (4.12) of a resonance of the tip in x and in y, regenerated with theta, percent.
+        Largest error (4.12) of a resonance of the tip in x and in y, regenerated with `theta`, percent.
     """
 
     name: str
@@ -101,17 +104,20 @@ class Unmeasured(NamedTuple):
 
 
 class NoisyParameters(NamedTuple):
-    """Parameters from noisy FRFs: one row of theta, and of errors of the resonances in percent, a realisation.
+    """Parameters from noisy FRFs and errors of the resonances, one row for each realisation.
 
     Attributes
     ----------
     noise : str
+        Name of the noise.
     route, estimator : str
+        Names of the route and of the estimator.
     theta : ndarray, shape (r, 12)
+        Stiffness of the six DOFs, then damping.
     shift : ndarray, shape (r, n_peaks)
-        Error (4.12) of every resonance, x then y.
+        Error (4.12) of every resonance, x then y, percent.
     found : ndarray of bool, shape (r, n_peaks)
-        If False, the shift is the limit of the search.
+        Whether a resonance was found; if False, `shift` is the limit of the search.
     """
 
     noise: str
@@ -129,20 +135,27 @@ class BoltedLapResult:
     Attributes
     ----------
     case : BoltedLapCase
+        Case with its keys.
     n_realisations : int
+        Number of realisations of each noise.
     state : PreloadedLap
+        Static state under preload.
     n_dofs : int
         Number of DOFs of the solid model.
     natural_frequencies : ndarray, shape (n_modes,)
-        Up to the last line, Hz.
+        Natural frequencies up to the last line, Hz.
     k_lines : dict
-        Route to K* line by line, shape (n_freq, 6, 6).
+        K* line by line, shape (n_freq, 6, 6), by route.
     regenerated : list of RegeneratedTip
+        FRFs with every identified joint.
     actual, transferred : ndarray, shape (n_freq, 2)
         FRFs of the tip of the solid model, with B and with the other B, m/N.
     peaks, transferred_peaks : list of Resonance
+        Resonances of these FRFs.
     unmeasured : list of Unmeasured
+        Parameters without the entries that cannot be measured.
     noisy : list of NoisyParameters
+        Parameters from noisy FRFs.
     """
 
     case: BoltedLapCase
@@ -166,7 +179,7 @@ def preloaded_frfs(case: BoltedLapCase) -> SolidFrfs:
 
 
 def bolted_lap_result(computed: Computed[BoltedLapCase, SolidFrfs]) -> BoltedLapResult:
-    """Return the result of a case whose realisations are under way."""
+    """Return the result of a case from its realisations."""
     case, solid, workers = computed.case, computed.frfs, computed.workers
     both = case.beams.lengths[1:]
     transferred = workers.begin(solid_frfs, case, both[1], False)
@@ -193,7 +206,7 @@ def bolted_lap_result(computed: Computed[BoltedLapCase, SolidFrfs]) -> BoltedLap
 
 
 def _on_case(case: BoltedLapCase, solid: SolidFrfs) -> ComplexArray:
-    """FRFs of the tip of a solid model on the lines of the case."""
+    """Return FRFs of the tip of a solid model on the lines of the case."""
     return solid.tip[np.searchsorted(solid.tip_hz, case.freq_hz)]
 
 
@@ -204,11 +217,11 @@ def _regenerated(
     k_lines: dict[str, ComplexArray],
     peaks: tuple[list[Resonance], list[Resonance]],
 ) -> list[RegeneratedTip]:
-    """FRFs of the tip with every identified joint, with both beams B."""
+    """Return FRFs of the tip with every identified joint, with both beams B."""
     found = by_band_means(case, k_lines) + by_compliance_fit(case, solid.points, solid.channels)
     freq = beams[0].freq_hz
     joints = [(one, constant_joint(one.theta, freq)) for one in found]
-    # Last, all entries of K* of the reference points, line by line and linear between the lines.
+    # The last joint is K* of the reference points with all entries, interpolated linearly between the lines.
     all_entries = interp1d(case.freq_hz, k_lines["reference points"], axis=0)(freq)
     joints.append((Found("reference points", LINES, np.full(12, np.nan)), all_entries))
     at = np.searchsorted(freq, case.freq_hz)
@@ -221,7 +234,7 @@ def _regenerated(
 
 
 def _unmeasured(case: BoltedLapCase, beams: BeamFrfs) -> list[Unmeasured]:
-    """Set entries to zero that cannot be measured, in exact FRFs of beams with a known joint (section 4.3.3.1)."""
+    """Return parameters of a known joint from exact FRFs without entries that cannot be measured (section 4.3.3.1)."""
     h_c = beams.on(case.freq_hz).coupled(case.joint.dynamic_stiffness(case.freq_hz))
     gamma = np.ascontiguousarray(h_c[:, :12, :12])
     no_x, no_z = (np.ones((6, 6), bool) for _ in "xz")
@@ -239,7 +252,7 @@ def _unmeasured(case: BoltedLapCase, beams: BeamFrfs) -> list[Unmeasured]:
     for name, h in masked.items():
         lines = joint_stiffness_lines(h)
         theta = case.bands.means(case.freq_hz, lines)
-        # Without some of its entries gamma belongs to no joint whose cross terms are zero.
+        # A matrix gamma with missing entries fits no joint without cross terms.
         fit = fit_measured(case.freq_hz, DOFS, h, np.eye(12))
         fitted = np.concatenate([fit.stiffness, fit.damping])
         found.append(Unmeasured(name, lines, theta, fitted, _shift(case, beams, theta)))
@@ -247,7 +260,7 @@ def _unmeasured(case: BoltedLapCase, beams: BeamFrfs) -> list[Unmeasured]:
 
 
 def _shift(case: BoltedLapCase, beams: BeamFrfs, theta: FloatArray) -> FloatArray:
-    """Largest errors of the resonances in x and in y where constants replace the known joint."""
+    """Return the largest errors of the resonances in x and in y if constants replace the known joint."""
     exact, tip = (beams.tip(constant_joint(one, beams.freq_hz)) for one in (case.actual, theta))
     peaks = resonances(beams.freq_hz, exact)
     errors = resonance_errors(beams.freq_hz, peaks, tip).frequency
@@ -256,7 +269,7 @@ def _shift(case: BoltedLapCase, beams: BeamFrfs, theta: FloatArray) -> FloatArra
 
 
 def _noisy(found: GroupEstimates, beams: BeamFrfs, peaks: list[Resonance]) -> list[NoisyParameters]:
-    """Return the realisations of every route of an estimator, with the resonances that they regenerate."""
+    """Return parameters of all realisations for every route of an estimator, with errors of the resonances."""
     estimator, routes = ESTIMATORS[found.group.method]
     studies = []
     for route, theta in zip(routes, np.split(found.estimates.values, len(routes), axis=1), strict=True):
@@ -267,21 +280,24 @@ def _noisy(found: GroupEstimates, beams: BeamFrfs, peaks: list[Resonance]) -> li
     return studies
 
 
-#: Half of the central 95 % of a normal distribution, in standard deviations.
+#: Half-width of the central 95 % interval of a normal distribution, in standard deviations.
 _REACH = 1.959963984540054
 
 
 @dataclass(frozen=True)
 class LapSource:
-    """Realisations of the measurement at five points a side, identified by one estimator by all of its routes.
+    """Estimates of one estimator with all of its routes, from realisations of the measurement at five points per side.
 
     Attributes
     ----------
     case : BoltedLapCase
+        Case with its keys.
     noise : Noise
+        Noise of the realisations.
     method : str
-        A key of `ESTIMATORS`.
+        Key of `ESTIMATORS`.
     points : tuple of FivePoints
+        Measured points on sides j and k.
     channels : ndarray, shape (n_freq, 30, 30)
         Exact FRFs of the measured points, m/N.
     """
@@ -293,7 +309,7 @@ class LapSource:
     channels: ComplexArray
 
     def __call__(self, first: int, count: int) -> Estimates:
-        """Identify the joint from each realisation."""
+        """Return the parameters of the joint from each realisation."""
         return Estimates(*np.array([self._identified(number) for number in range(first, first + count)]).swapaxes(0, 1))
 
     def _identified(self, number: int) -> FloatArray:
@@ -308,9 +324,9 @@ class LapSource:
 
 
 def estimate_groups(case: BoltedLapCase, solid: SolidFrfs, choice: StudyChoice | None) -> list[EstimateGroup]:
-    """Return every noise with every estimator, each by all of its routes.
+    """Return a group for every noise and estimator, each with all routes of the estimator.
 
-    The parameters of the joint of the solid model are unknown: there are no actual values.
+    Columns have no actual values because the parameters of the joint of the solid model are unknown.
     """
     choice = choice or StudyChoice()
     groups = []

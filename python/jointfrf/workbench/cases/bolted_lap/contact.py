@@ -21,33 +21,37 @@ BoolArray = NDArray[np.bool_]
 #: Contact acts along y; x and z are tangential.
 NORMAL: Final = 1
 TANGENTIAL: Final = np.array([0, 2])
-#: Tension and penetration count as zero below this share of the largest normal force or relative displacement.
+#: Tolerance of tension and penetration, as a fraction of the largest normal force or relative displacement.
 _ROUNDING: Final = 1e-9
-#: Friction forces of slipping pairs must repeat to this share of the largest normal force.
+#: Tolerance of the friction forces of slipping pairs, as a fraction of the largest normal force.
 _REPEAT: Final = 1e-6
-#: Stiffness of the springs that hold slipping pairs, as a share of that of a node.
+#: Stiffness of the springs on slipping pairs, as a fraction of the stiffness of a node.
 _SOFT: Final = 1e-8
-#: A pivot below this share of the largest means a body that can move freely.
+#: A pivot below this fraction of the largest pivot indicates a rigid-body motion.
 _SINGULAR: Final = 1e-13
 
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """How faces resist each other.
+    """Contact law of two faces: friction and contact stiffness.
 
     Parameters
     ----------
     friction : float
-        Coulomb's mu (4.1).
+        Coefficient of Coulomb friction mu (4.1), default 0.3.
     normal_stiffness, tangential_stiffness : float or None
-        Pressure over overlap and shear stress over elastic slip, N/m^3. The defaults are of the order of machined metal
-        faces under high pressure. None is rigid: closed pairs do not overlap, sticking pairs do not move at all, and
-        their nodes are tied exactly.
+        Pressure divided by overlap and shear stress divided by elastic slip, N/m^3. The defaults 1e14 and 1e13 are
+        typical of machined metal faces under high pressure. None is rigid: closed pairs do not overlap, sticking pairs
+        do not move relative to each other, and their nodes are tied exactly.
 
     Raises
     ------
     ValueError
         Negative friction, a stiffness that is not positive.
+
+    See Also
+    --------
+    solve_contact : Static equilibrium with contact.
 
     Examples
     --------
@@ -70,12 +74,12 @@ class ContactLaw:
 
 @dataclass(frozen=True)
 class ContactInterface:
-    """Two faces that may touch, given by pairs of nodes.
+    """Two faces in potential contact, as pairs of nodes.
 
     Attributes
     ----------
     lower, upper : ndarray of int, shape (n_pairs,)
-        Nodes of the body on the side of lower y, and their partners on the body above, counted from 0.
+        Nodes of the body at lower y, and the opposite nodes of the body above, counted from 0.
     area : ndarray, shape (n_pairs,)
         Area of each pair, m^2.
     """
@@ -86,14 +90,14 @@ class ContactInterface:
 
 
 class Pairs:
-    """The pairs of several interfaces in one row.
+    """Pairs of several interfaces, one after another.
 
     Parameters
     ----------
     interfaces : mapping of str to ContactInterface
-        No node may belong to two pairs.
+        Interfaces by name; no node may belong to two pairs.
     n : int
-        Number of DOFs: x, y, z of node 0, then of node 1, ...; others may follow.
+        Number of DOFs: x, y, z of node 0, then of node 1, ..., then any other DOFs.
     """
 
     def __init__(self, interfaces: Mapping[str, ContactInterface], n: int) -> None:
@@ -108,7 +112,7 @@ class Pairs:
         self.low = 3 * self.lower[:, None] + np.arange(3)
 
     def tied(self, law: ContactLaw, closed: BoolArray, sticking: BoolArray) -> BoolArray:
-        """Return the directions in which upper nodes follow the lower ones exactly, (n_pairs, 3)."""
+        """Return the directions in which upper nodes are tied to lower nodes, shape (n_pairs, 3)."""
         tied = np.zeros((len(self.area), 3), bool)
         if law.normal_stiffness is None:
             tied[closed, NORMAL] = True
@@ -117,7 +121,7 @@ class Pairs:
         return tied
 
     def springs(self, law: ContactLaw, closed: BoolArray, sticking: BoolArray) -> sparse.csr_array:
-        """Return the stiffness of the springs between closed pairs, (n, n)."""
+        """Return the stiffness matrix of the springs between closed pairs, shape (n, n), N/m."""
         stiffness = np.zeros((len(self.area), 3, 3))
         if law.normal_stiffness is not None:
             stiffness[closed, NORMAL, NORMAL] = law.normal_stiffness * self.area[closed]
@@ -127,7 +131,7 @@ class Pairs:
         return self.between(stiffness)
 
     def between(self, stiffness: FloatArray) -> sparse.csr_array:
-        """Return springs between the nodes of each pair, given by blocks (n_pairs, 3, 3) in N/m."""
+        """Return the stiffness matrix of springs between the nodes of each pair, from blocks (n_pairs, 3, 3) in N/m."""
         used = stiffness.any(axis=(1, 2))
         blocks = stiffness[used]
         ends = np.concatenate([self.up[used], self.low[used]], axis=1)
@@ -139,22 +143,27 @@ class Pairs:
 
 
 def tie(pairs: Pairs, tied: BoolArray, fixed: ArrayLike = ()) -> tuple[sparse.csr_array, NDArray[np.int64]]:
-    """Expand independent displacements to all: tied nodes follow their partners, which eliminates them exactly.
+    """Return the matrix that expands independent displacements to all DOFs, without tied and fixed DOFs.
 
     Parameters
     ----------
     pairs : Pairs
+        Pairs of nodes.
     tied : ndarray of bool, shape (n_pairs, 3)
-        Directions in which the upper node follows the lower one.
+        Directions in which the upper node is tied to the lower node.
     fixed : array_like of int
-        DOFs that do not move.
+        Fixed DOFs, none by default.
 
     Returns
     -------
     expansion : csr_array, shape (n, n_independent)
-        Zeros and ones.
+        Matrix of zeros and ones.
     independent : ndarray of int, shape (n_independent,)
-        These DOFs, ascending.
+        Independent DOFs in ascending order.
+
+    See Also
+    --------
+    solve_contact : Static equilibrium with contact.
     """
     n = pairs.n
     followers, leaders = pairs.up[tied], pairs.low[tied]
@@ -162,7 +171,7 @@ def tie(pairs: Pairs, tied: BoolArray, fixed: ArrayLike = ()) -> tuple[sparse.cs
     independent[np.asarray(fixed, np.int64)] = False
     stands_for = np.arange(n)
     stands_for[followers] = leaders
-    # Where a follower is fixed and its leader is not, the leader is fixed too.
+    # If a tied node is fixed, its partner is fixed, too.
     independent[leaders[~independent[followers]]] = False
     rows = np.flatnonzero(independent[stands_for])
     independent[followers] = False
@@ -178,17 +187,17 @@ class InterfaceState:
     Attributes
     ----------
     closed, slipping : ndarray of bool, shape (n_pairs,)
-        Pairs in contact, and those among them at the limit of friction.
+        Pairs in contact, and pairs in contact at the limit of friction.
     force : ndarray, shape (n_pairs, 3)
-        On the upper body, N.
+        Force on the upper body, N.
     pressure : ndarray, shape (n_pairs,)
-        Normal force over area, Pa.
+        Normal force divided by area, Pa.
     separation : ndarray, shape (n_pairs,)
-        Distance along y, m; negative where closed pairs of finite stiffness overlap.
+        Distance along y, m; negative if closed pairs of finite stiffness overlap.
     slide : ndarray, shape (n_pairs, 2)
-        Displacement of the upper node relative to the lower one along x and z, m.
+        Displacement of the upper node relative to the lower node along x and z, m.
     slip_ratio : ndarray, shape (n_pairs,)
-        Shear stress over its limit mu p (4.1)-(4.2): 1 where slipping, 0 where open or without friction.
+        Shear stress divided by its limit mu p (4.1)-(4.2): 1 if slipping, 0 if open or without friction.
     """
 
     closed: BoolArray
@@ -201,22 +210,22 @@ class InterfaceState:
 
     @property
     def normal_force(self) -> float:
-        """Resultant that presses the two bodies together, N."""
+        """Resultant normal force between the two bodies, N."""
         return float(self.force[:, NORMAL].sum())
 
 
 @dataclass(frozen=True)
 class Iteration:
-    """One solution with a given set of contacts.
+    """Iteration of the active set: one solution with a given set of contacts.
 
     Attributes
     ----------
     closed, slipping : int
-        Pairs that were.
+        Numbers of closed pairs and of slipping pairs.
     changed : int
-        Pairs whose state the solution contradicts; none in the last iteration.
+        Number of pairs whose state changes after the solution; 0 in the last iteration.
     residual : float
-        Forces out of balance over the largest load.
+        Residual force divided by the largest load.
     """
 
     closed: int
@@ -227,14 +236,16 @@ class Iteration:
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """Static equilibrium.
+    """Static equilibrium of bodies in contact.
 
     Attributes
     ----------
     displacement : ndarray, shape (n,)
-        Displacement of all DOFs.
+        Displacements of all DOFs.
     interfaces : dict of str to InterfaceState
+        Forces and displacements of each interface.
     history : tuple of Iteration
+        Iterations of the active set.
     """
 
     displacement: FloatArray
@@ -251,20 +262,22 @@ def solve_contact(
     fixed: ArrayLike = (),
     max_iterations: int = 50,
 ) -> ContactSolution:
-    """Find the static equilibrium of elastic bodies that touch at pairs of nodes, small displacements.
+    """Return the static equilibrium of elastic bodies in contact at pairs of nodes, for small displacements.
 
     Parameters
     ----------
     stiffness : sparse array, shape (n, n)
-        Symmetric, N/m: x, y, z of node 0, then of node 1, ...; other DOFs may follow.
+        Symmetric stiffness matrix, N/m. DOFs are x, y, z of node 0, then of node 1, ..., then any other DOFs.
     load : ndarray, shape (n,)
-        N. It is applied in one step from the unloaded state.
+        Forces on the DOFs, N, applied in one step from the unloaded state.
     interfaces : mapping of str to ContactInterface
-        No node may belong to two pairs.
+        Interfaces by name; no node may belong to two pairs.
     law : ContactLaw
+        Contact law of all interfaces.
     fixed : array_like of int
-        DOFs that do not move.
+        Fixed DOFs, none by default.
     max_iterations : int
+        Largest number of iterations, default 50.
 
     Returns
     -------
@@ -277,18 +290,27 @@ def solve_contact(
 
     Notes
     -----
-    All pairs begin closed and sticking, so a body that touches a supported one is supported. A closed pair in tension
-    opens, an open one that overlaps closes (primal-dual active set). A sticking pair beyond the cone slips: its shear
-    force is mu p against the sliding, solved for together with p, and its direction is found by Newton's method. A
-    slipping pair that is pushed back sticks again. The load comes in one step, so its path is not traced: exact where
-    the contacts do not depend on the level of the load, as without slip.
+    The method is a primal-dual active set with these rules:
 
-    Springs of 1e-8 of the stiffness of a node act on slipping pairs, for bodies that only friction supports; without
-    slip there is no regularisation.
+    - Initially, all pairs are closed and sticking, so a body is supported by contact with a supported body.
+    - A closed pair in tension opens. An open pair that overlaps closes.
+    - A sticking pair outside the friction cone slips. Its shear force is mu p, opposite to the sliding; the solution
+      gives the force together with p, and Newton's method gives its direction.
+    - A slipping pair sticks again if the sliding reverses.
+
+    The load is applied in one step, so the load path is not followed. The result is exact if the contacts do not depend
+    on the load level, which is true without slip.
+
+    Springs of 1e-8 of the stiffness of a node act on slipping pairs, to support bodies that are fixed only by friction.
+    Without slip there is no regularisation.
+
+    See Also
+    --------
+    jointfrf.workbench.cases.bolted_lap.preload.preload : Static state of a lap joint under preload.
 
     Examples
     --------
-    Two cubes of 10 mm, one on the other, pressed together:
+    Two cubes of 10 mm are stacked and compressed:
 
     >>> import numpy as np
     >>> from jointfrf.workbench.solids.brick import Material, assemble_bricks
@@ -310,15 +332,16 @@ def solve_contact(
 
 @dataclass
 class _Contacts:
-    """A set of contacts.
+    """Set of contacts.
 
     Attributes
     ----------
     closed, slipping : ndarray of bool, shape (n_pairs,)
+        Pairs in contact, and slipping pairs.
     direction : ndarray, shape (n_pairs, 2)
-        Of the slide, unit vector of x and z.
+        Unit vector of the sliding in x and z.
     turning : ndarray, shape (n_pairs,)
-        Stiffness of the shear force against a slide across its direction, N/m.
+        Stiffness of the shear force for sliding normal to its direction, N/m.
     """
 
     closed: BoolArray
@@ -362,7 +385,7 @@ class _Problem:
         )
 
     def solve(self, contacts: _Contacts) -> tuple[FloatArray, float]:
-        """Return the displacements with these contacts, and the forces left out of balance over the largest load."""
+        """Return the displacements with these contacts, and the residual force divided by the largest load."""
         pairs, law = self.pairs, self.law
         closed, sticking = contacts.closed, contacts.sticking()
         t, _ = tie(pairs, pairs.tied(law, closed, sticking), self.fixed)
@@ -388,9 +411,9 @@ class _Problem:
         return u, float(abs(matrix @ q - right).max() / abs(self.f).max())
 
     def slip_stiffness(self, contacts: _Contacts, slips: BoolArray) -> FloatArray:
-        """Return the springs of slipping pairs: soft ones, and what shear gains as its direction turns.
+        """Return the stiffness of slipping pairs: regularisation, and the derivative of the shear force's direction.
 
-        Shear -mu p w/|w| changes with the slide w, across its direction d, by mu p/|w|: Newton's method.
+        The derivative of the shear force -mu p w/|w| with respect to sliding w normal to its direction d is mu p/|w|.
         """
         d = contacts.direction[slips]
         across = np.eye(2) - d[:, :, None] * d[:, None, :]
@@ -401,9 +424,9 @@ class _Problem:
         return blocks
 
     def friction_rows(self, contacts: _Contacts, slips: BoolArray) -> sparse.csr_array:
-        """Return what adds mu p d to the tangential equations of slipping pairs, p the residual of the normal one.
+        """Return the matrix that adds mu p d to the tangential equations of slipping pairs; p is the normal residual.
 
-        The shear force on an upper node is -mu p d; the lower one takes the opposite.
+        The shear force is -mu p d on an upper node, and mu p d on a lower node.
         """
         pairs, n = self.pairs, len(self.f)
         normal = pairs.up[slips, NORMAL]
@@ -413,7 +436,7 @@ class _Problem:
         return sparse.csr_array((values, (rows, np.tile(normal, 4))), shape=(n, n))
 
     def judged(self, contacts: _Contacts, force: FloatArray, relative: FloatArray) -> _Contacts:
-        """Return the contacts that follow from the solution."""
+        """Return the updated contacts from the solution."""
         normal, shear, slide = force[:, NORMAL], force[:, TANGENTIAL], relative[:, TANGENTIAL]
         overlaps = relative[:, NORMAL] < -_ROUNDING * abs(relative).max()
         closed = np.where(contacts.closed, normal > -_ROUNDING * abs(normal).max(), overlaps)

@@ -1,4 +1,4 @@
-"""FRFs of a bolted lap joint: of the preloaded solid model, of the beams by themselves; resonances of the tip."""
+"""FRFs of the preloaded solid model and of the single beams of a bolted lap joint, and resonances of the tip."""
 
 from __future__ import annotations
 
@@ -37,40 +37,42 @@ __all__ = [
     "solid_frfs",
 ]
 
-#: Natural frequencies of the solid model that are sought.
+#: Number of natural frequencies of the solid model.
 _MODES = 12
-#: Lines where peaks are sought lie this share of a half-power bandwidth apart, out to so many bandwidths.
+#: Spacing of the lines around a peak, and their extent, in half-power bandwidths.
 _SPACING, _EXTENT = 1 / 8, 3
-#: Lines nearer than this share of their frequency are one.
+#: Lines closer than this fraction of their frequency are merged.
 _COINCIDENT = 1e-6
-#: Loss factor that lines are laid out for where the beams have less.
+#: Least loss factor that sets the spacing of lines.
 _LEAST_LOSS = 0.005
 #: Directions in which FRFs of the tip are compared.
 TIP_DIRECTIONS = ("x", "y")
-#: The joint DOFs among those of either beam.
+#: Positions of the joint DOFs in the DOFs of each beam.
 JOINT_DOFS = list(range(6))
 
 
 @dataclass(frozen=True)
 class SolidFrfs:
-    """The preloaded solid model and its FRFs.
+    """Preloaded solid model and its FRFs.
 
     Attributes
     ----------
     state : PreloadedLap
+        Static state under preload.
     model : SolidModel
+        Linear model about this state.
     points : tuple of FivePoints
         Measured points on sides j and k.
     channels : ndarray, shape (n_freq, 30, 30)
-        Between the measured channels, m/N; empty where only the tip is computed.
+        Receptances between the measured channels, m/N; empty if only the tip is computed.
     reference : ndarray, shape (n_freq, 12, 12)
-        Between reference points with six DOFs on both sides; empty as above.
+        Receptances between the six-DOF reference points of both sides, m/N; empty if only the tip is computed.
     natural_frequencies : ndarray, shape (12,)
-        Hz.
+        Natural frequencies of the model, Hz.
     tip_hz : ndarray, shape (n_tip,)
-        Lines of the tip, Hz: those of the case, and close ones around the natural frequencies.
+        Frequency lines of the case, and close lines around the natural frequencies, Hz.
     tip : ndarray, shape (n_tip, 2)
-        Of the tip in `TIP_DIRECTIONS`.
+        Receptances of the tip in `TIP_DIRECTIONS`, m/N.
     """
 
     state: PreloadedLap
@@ -90,9 +92,9 @@ class BeamFrfs:
     Attributes
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Lines of the case, and others between them, close enough for the peaks of the assembly, Hz.
+        Frequency lines of the case, and additional lines that resolve the peaks of the assembly, Hz.
     h_a, h_b : ndarray, shapes (n_freq, 6, 6), (n_freq, 8, 8)
-        m/N.
+        Receptances of A and B, m/N.
     """
 
     freq_hz: FloatArray
@@ -105,11 +107,11 @@ class BeamFrfs:
         return BeamFrfs(freq_hz, self.h_a[at], self.h_b[at])
 
     def coupled(self, k_joint: ComplexArray) -> ComplexArray:
-        """Receptance of the assembly through a joint: DOFs of A, then of B (2.26)."""
+        """Return the receptance of the assembly with a joint (2.26), DOFs of A, then of B."""
         return couple(self.h_a, self.h_b, k_joint, JOINT_DOFS, JOINT_DOFS)
 
     def tip(self, k_joint: ComplexArray) -> ComplexArray:
-        """FRFs of the tip of the assembly through an identified joint, shape (n_freq, 2)."""
+        """Return FRFs of the tip of the assembly with an identified joint, shape (n_freq, 2), m/N."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", IllConditionedWarning)  # identified joints may be absurd
             h_c = self.coupled(k_joint)
@@ -117,7 +119,7 @@ class BeamFrfs:
 
 
 def solid_frfs(case: BoltedLapCase, length_b: float, measured: bool) -> SolidFrfs:
-    """Preload, linearise, and take the FRFs: all, or at the tip only."""
+    """Return the FRFs of the linear model about the preloaded state, at all channels or only at the tip."""
     lap = _lap(case, length_b)
     state = preload(lap, case.preload, ContactLaw(friction=case.friction))
     model = state.model()
@@ -143,7 +145,7 @@ def _loss(case: BoltedLapCase) -> float:
 
 
 def _with_lines_around(case: BoltedLapCase, natural: FloatArray) -> FloatArray:
-    """Lines of the case, and lines around natural frequencies as close as the loss factor asks for."""
+    """Return lines of the case, and lines around natural frequencies with a spacing from the loss factor."""
     steps = np.arange(-_EXTENT, _EXTENT + _SPACING, _SPACING)
     close = (natural[:, None] * (1 + _loss(case) * steps)).ravel()
     first, last = case.freq_hz[[0, -1]]
@@ -151,14 +153,14 @@ def _with_lines_around(case: BoltedLapCase, natural: FloatArray) -> FloatArray:
 
 
 def _close_lines(case: BoltedLapCase) -> FloatArray:
-    """Lines of the case, and lines throughout their range as close as the loss factor asks for."""
+    """Return lines of the case, and lines over its whole range with a spacing from the loss factor."""
     first, last = case.freq_hz[[0, -1]]
     count = int(np.log(last / first) / np.log1p(_SPACING * _loss(case))) + 2
     return _joined(case.freq_hz, np.geomspace(first, last, count)[1:-1])
 
 
 def _joined(lines: FloatArray, close: FloatArray) -> FloatArray:
-    """All of the first lines and those of the second that do not nearly coincide with any other."""
+    """Return all lines of the case, and close lines that do not nearly coincide with any other line."""
     every = np.unique(np.concatenate([lines, close]))
     gaps = np.concatenate([[np.inf], np.diff(every), [np.inf]])
     apart = np.minimum(gaps[:-1], gaps[1:]) > _COINCIDENT * every
@@ -175,19 +177,19 @@ def _lap(case: BoltedLapCase, length_b: float) -> BoltedLap:
 
 
 def _tip(mesh: Mesh) -> sparse.csr_array:
-    """Weights of all nodes for the mean motion of the end of B."""
+    """Return weights of all nodes for the mean motion of the end of B."""
     nodes = mesh.nodes
     end = np.flatnonzero(nodes[:, 2] > nodes[:, 2].max() - 1e-9).astype(np.int32)
     return _mean(mesh, end, nodes[end].mean(axis=0), TIP_DIRECTIONS)
 
 
 def _mean(mesh: Mesh, nodes: NDArray[np.int32], point: FloatArray, dofs: tuple[str, ...]) -> sparse.csr_array:
-    """Weights of all nodes for the mean rigid motion of some about a point, DOFs in the given order."""
+    """Return weights of all nodes for the mean rigid motion of given nodes about a point, in the order of the DOFs."""
     return mean_motion(mesh, Patch(point, nodes))[[DIRECTIONS.index(dof) for dof in dofs]]
 
 
 def beam_frfs(case: BoltedLapCase, length_b: float) -> BeamFrfs:
-    """FRFs of the beams by themselves, with reference points where the bolt presses."""
+    """Return FRFs of the single beams, with reference points at the faces under the head and the nut."""
     beams = case.beams
     size = (beams.width, beams.height, beams.material)
     start = beams.overlap / 2
@@ -202,15 +204,15 @@ def beam_frfs(case: BoltedLapCase, length_b: float) -> BeamFrfs:
     return BeamFrfs(freq, h_a, h_b)
 
 
-#: A regenerated resonance is sought within this share of the actual one.
+#: Half-width of the search band of a regenerated resonance, as a fraction of its actual frequency.
 _REACH = 0.15
-#: Peaks count when they exceed their surroundings by this factor.
+#: Least prominence of a peak, as a factor.
 _PROMINENCE = 1.5
 
 
 @dataclass(frozen=True)
 class Resonance:
-    """A resonance of the actual FRF: direction, Hz, m/N, and the band in which it is sought again."""
+    """Resonance of the actual FRF: direction, frequency in Hz, amplitude in m/N, and search band in Hz."""
 
     direction: str
     freq_hz: float
@@ -224,10 +226,10 @@ class ResonanceErrors(NamedTuple):
     Attributes
     ----------
     amplitude, frequency : ndarray, shape (n_peaks,)
-        (4.11) and (4.12), percent.
+        Errors (4.11) and (4.12), percent.
     found : ndarray of bool, shape (n_peaks,)
-        Whether the regenerated FRF has a peak in the band. Where it has none, its largest value lies at an end of the
-        band: the frequency error is the limit of the search, not a result, and the amplitude error is NaN.
+        Whether the regenerated FRF has a peak in the band. Without a peak, the largest value is at an end of the band.
+        The frequency error is then the limit of the search, and the amplitude error is NaN.
     """
 
     amplitude: FloatArray
@@ -236,7 +238,7 @@ class ResonanceErrors(NamedTuple):
 
 
 def resonances(freq_hz: FloatArray, tip: ComplexArray) -> list[Resonance]:
-    """Resonances of the FRFs of the tip, shape (n_freq, 2); each band ends at the valleys on either side."""
+    """Return resonances of the FRFs of the tip, shape (n_freq, 2); each band ends at the minima on both sides."""
     from scipy.signal import find_peaks  # takes as long to import as all else together
 
     found = []
@@ -255,7 +257,7 @@ def resonances(freq_hz: FloatArray, tip: ComplexArray) -> list[Resonance]:
 
 
 def resonance_errors(freq_hz: FloatArray, peaks: list[Resonance], h: ComplexArray) -> ResonanceErrors:
-    """Errors of the regenerated FRFs of the tip, shape (n_freq, 2), at every resonance; peaks between the lines."""
+    """Return errors of regenerated FRFs of the tip, shape (n_freq, 2), with peaks interpolated between the lines."""
     errors = []
     for one in peaks:
         own = h[:, TIP_DIRECTIONS.index(one.direction)]

@@ -1,4 +1,4 @@
-"""A case of a bolted lap joint: the keys of its files, and the case that they give."""
+"""Keys of the files of a case of a bolted lap joint, and the case itself."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class LapBeams(MaterialKeys):
         Positive, key("Length of another B, to which the identified joint is transferred.", "m", example=0.2)
     ]
     width: Annotated[Positive, key("Width.", "m", example=0.025)]
-    height: Annotated[Positive, key("Thickness of each.", "m", example=0.006)]
+    height: Annotated[Positive, key("Thickness of each beam.", "m", example=0.006)]
     overlap: Annotated[Positive, key("Length of the overlap.", "m", example=0.025)]
     hole_radius: Annotated[Positive, key("Radius of the hole, in the middle of the overlap.", "m", example=0.0045)]
     preset: Annotated[Preset, PRESET]
@@ -61,7 +61,9 @@ class BoltKeys(MaterialKeys):
     """A bolt of solid elements, and its preload (4.3), (4.4)."""
 
     size: Annotated[str, key("Thread, for the stress area.", choice=STRESS_AREA, example="M8")]
-    strength_class: Annotated[str, key("For the proof strength.", choice=PROOF_STRENGTH, example="10.9")]
+    strength_class: Annotated[
+        str, key("Property class; sets the proof strength.", choice=PROOF_STRENGTH, example="10.9")
+    ]
     preload_share: Annotated[Positive, key("Preload as a share of the proof load.", le=1, example=0.75)]
     shank_radius: Annotated[Positive, key("Radius of the shank.", "m", example=0.004)]
     head_radius: Annotated[Positive, key("Radius of the head.", "m", example=0.0065)]
@@ -79,12 +81,12 @@ class ContactKeys(Keys):
 class MeasurementKeys(Keys):
     """Points around the reference point, for rotations by central differences."""
 
-    spacing_x: Annotated[Positive, key("From the reference point to its neighbours along x.", "m", example=0.01)]
-    spacing_z: Annotated[Positive, key("The same along z.", "m", example=0.01)]
+    spacing_x: Annotated[Positive, key("Distance of the neighbours of the reference point along x.", "m", example=0.01)]
+    spacing_z: Annotated[Positive, key("Distance of the neighbours of the reference point along z.", "m", example=0.01)]
 
 
 class BoltedLapKeys(CaseKeys, tag="bolted-lap"):
-    """A lap joint with a preloaded bolt of solid elements, and what is measured on it."""
+    """A lap joint with a preloaded bolt of solid elements, and its simulated measurement."""
 
     examples = {"frequency": {"last": 600.0, "step": 2.0}, "study": {"realisations": 4}}  # noqa: RUF012
     beams: Annotated[LapBeams, key("The beams.")]
@@ -101,29 +103,35 @@ class BoltedLapKeys(CaseKeys, tag="bolted-lap"):
 
 
 class BoltedLapExpected(ExpectedKeys):
-    """What is known about a case beforehand; the file may be missing."""
+    """Expected results of a case; the file may be missing."""
 
     frequencies: Annotated[ExpectedFrequencies | None, key("Natural frequencies.")] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class BoltedLapCase(Case, WithActualJoint):
-    """A lap joint with a preloaded bolt of solid elements, and what is measured on it.
+    """Case of a lap joint with a preloaded bolt of solid elements.
 
     Attributes
     ----------
     beams : LapBeams
+        Dimensions and material of the beams.
     bolt : Bolt
+        Dimensions and material of the bolt.
     preload : float
-        N.
+        Preload force, N.
     friction : float
+        Coefficient of friction.
     spacing : tuple of float
-        s_x and s_z of the measured points, m.
+        Distances s_x and s_z of the measured points, m.
     joint : Joint
         Known joint of the error analysis, in the order of (4.5).
     bands : BandSet
+        Sensitive bands.
     noises : tuple of Noise
+        Noises, each with its methods.
     expected : ExpectedFrequencies or None
+        Expected natural frequencies.
     """
 
     beams: LapBeams
@@ -138,7 +146,7 @@ class BoltedLapCase(Case, WithActualJoint):
 
 
 def read_bolted_lap(common: Case, keys: BoltedLapKeys, expected: BoltedLapExpected) -> BoltedLapCase:
-    """Return the case that its files give; raises FileContentError."""
+    """Return the case of its files; raise FileContentError if they are invalid."""
     joint, _ = joints_of(keys.joint)
     if len(keys.joint) != len(DOFS):
         raise keys.joint[0].error("dof", f"the first of six: {', '.join(DOFS)}")

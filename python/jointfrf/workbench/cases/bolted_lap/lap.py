@@ -1,4 +1,4 @@
-"""Mesh of two beams in a lap joint with a bolt of solid elements: the bolt and its preload, the faces that touch."""
+"""Mesh of two beams and a bolt of solid elements in a lap joint, with its interfaces and the preload force."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ __all__ = [
     "preload_force",
 ]
 
-#: Usual values of steel.
+#: Typical values of steel.
 STEEL: Final = Material(youngs_modulus=210e9, poisson=0.3, density=7850.0, loss_factor=0.01)
 
 #: Proof strength of a property class, Pa: ISO 898-1, Table 3, diameters up to 16 mm.
@@ -55,30 +55,35 @@ Body = Literal["A", "B", "bolt"]
 BODIES: Final[tuple[Body, ...]] = get_args(Body)
 #: Lower and upper body of each interface.
 INTERFACES: Final[dict[str, tuple[Body, Body]]] = {"head": ("A", "bolt"), "lap": ("B", "A"), "nut": ("bolt", "B")}
-#: Bricks along a beam for each height of length, away from the overlap.
+#: Number of bricks along a beam outside the overlap, for a length equal to the height.
 _PER_HEIGHT: Final = 1.14
-#: Circles around the head reach this share of the way to the nearest edge.
+#: Extent of the circles around the head, as a fraction of the distance to the nearest edge.
 _CIRCLES_REACH: Final = 0.6
-#: The smallest scaled Jacobian that is accepted.
+#: Least accepted scaled Jacobian.
 _POOR: Final = 0.2
 
 
 @dataclass(frozen=True)
 class Bolt:
-    """Shank, head and nut as one body; the thread is left out.
+    """Shank, head and nut as one body without thread.
 
     Parameters
     ----------
     shank_radius, head_radius, nut_radius : float
-        m. Head and nut are round.
+        Radii of the shank, the round head and the round nut, m.
     head_height, nut_height : float
-        m.
+        Heights of head and nut, m.
     material : Material
+        Material of the bolt, default steel.
 
     Raises
     ------
     ValueError
         A dimension that is not positive; a head or nut that is not wider than the shank.
+
+    See Also
+    --------
+    bolted_lap : Lap joint with a bolt.
 
     Examples
     --------
@@ -106,26 +111,31 @@ class Bolt:
 
 
 def preload_force(tensile_area: float, proof_strength: float, share: float = 0.75) -> float:
-    """Preload of a bolt, F_i = share A_t S_p (4.3)-(4.4).
+    """Return the preload of a bolt, F_i = share A_t S_p (4.3)-(4.4).
 
     Parameters
     ----------
     tensile_area : float
         Tensile stress area A_t of the thread, m^2; see `STRESS_AREA`.
     proof_strength : float
-        S_p, Pa; see `PROOF_STRENGTH`.
+        Proof strength S_p, Pa; see `PROOF_STRENGTH`.
     share : float
-        Share of the proof load: 0.75 for connections that are taken apart again, 0.9 for permanent ones.
+        Fraction of the proof load, default 0.75. Usual values are 0.75 for connections that are taken apart again, and
+        0.9 for permanent connections.
 
     Returns
     -------
     float
-        N.
+        Preload force, N.
 
     Raises
     ------
     ValueError
         A value that is not positive; a share above 1.
+
+    See Also
+    --------
+    jointfrf.workbench.cases.bolted_lap.preload.preload : Static state under this force.
 
     Examples
     --------
@@ -144,22 +154,23 @@ def preload_force(tensile_area: float, proof_strength: float, share: float = 0.7
 
 @dataclass(frozen=True)
 class LapDivisions:
-    """Numbers of bricks.
+    """Numbers of bricks of a lap joint.
 
     Parameters
     ----------
     across : int
-        Along x, and a quarter of the way around the hole.
+        Number of bricks along x, and along a quarter of the hole.
     layers : int
-        Over the height of each beam, and of the shank within it.
+        Number of bricks over the height of each beam, and of the shank within the beam.
     rings : int
-        Around the hole, under the head and the nut.
+        Number of rings around the hole, under the head and the nut.
     circles : int
-        Around the head, before the mesh passes from round to square in two more layers.
+        Number of circles around the head, before two layers from the last circle to the edges.
     head, nut : int
-        Over their heights.
+        Numbers of bricks over the heights of head and nut.
     along : int, optional
-        Along each beam outside the overlap; by default bricks a little shorter than its height.
+        Number of bricks along each beam outside the overlap; by default, bricks are slightly shorter than the beam is
+        high.
 
     Raises
     ------
@@ -184,24 +195,29 @@ class LapDivisions:
 
 @dataclass(frozen=True)
 class BoltedLap:
-    """Two beams along z, A upon B, and the bolt through their overlap: one mesh of three bodies that share no node.
+    """Mesh of two beams along z, A on top of B, and the bolt through their overlap; the three bodies share no node.
 
     Attributes
     ----------
     mesh : Mesh
         Elements of A, then of B, then of the bolt.
     body : ndarray of str, shape (n_elements,)
-        "A", "B" or "bolt".
+        Body of each element: "A", "B" or "bolt".
     materials : tuple of Material
-        Of A, B and the bolt.
+        Materials of A, B and the bolt.
     interfaces : dict of str to ContactInterface
-        "head" (bolt upon A), "lap" (A upon B), "nut" (B upon the bolt): pairs of nodes at the same place.
+        Pairs of nodes at the same place: "head" (bolt on A), "lap" (A on B) and "nut" (B on the bolt).
     clamped : ndarray of int
-        Nodes that do not move.
+        Fixed nodes, counted from 0.
     axis : ndarray, shape (3,)
-        Intersection of the axis of the bolt with the plane between the beams, m. There the shank is cut for the
-        preload.
+        Intersection of the axis of the bolt with the plane between the beams, m. The preload acts at this cut of the
+        shank.
     preset : {"seed", "accurate"}
+        Elements; see `brick_beam`.
+
+    See Also
+    --------
+    bolted_lap : Mesh from dimensions.
     """
 
     mesh: Mesh
@@ -218,7 +234,7 @@ class BoltedLap:
         return np.flatnonzero(self.body == body)
 
     def held(self) -> NDArray[np.int64]:
-        """Return the DOFs of the clamped nodes, x, y, z of each."""
+        """Return the DOFs x, y, z of the clamped nodes."""
         return (3 * self.clamped[:, None].astype(np.int64) + np.arange(3)).ravel()
 
     def element_materials(self) -> list[Material]:
@@ -240,26 +256,27 @@ def bolted_lap(
     preset: Preset = "accurate",
     divisions: LapDivisions | None = None,
 ) -> BoltedLap:
-    """Lap joint with a bolt of solid elements, case study 2 by default.
+    """Return the mesh of a lap joint with a bolt of solid elements, case study 2 by default.
 
-    A lies at z from 0, y from 0 up. B lies at z from the length of A less the overlap, y from 0 down. The axis of the
-    bolt is along y through the middle of the overlap.
+    A extends from z = 0 and upwards from y = 0. B begins at z = length of A minus overlap, and extends downwards from
+    y = 0. The axis of the bolt is parallel to y through the middle of the overlap.
 
     Parameters
     ----------
     lengths, heights : tuple of float
-        Of A and of B, m.
+        Lengths and heights of A and of B, m.
     width, overlap, hole_radius : float
-        m.
+        Width of the beams, length of the overlap, and radius of the hole, m.
     bolt : Bolt, optional
-        M8 by default.
+        Bolt, default M8.
     materials : tuple of Material
-        Of A and of B.
+        Materials of A and of B, default aluminium.
     ends : tuple of {"clamped", "free"}
-        First face of A, last face of B.
+        Supports of the first face of A and of the last face of B, default ("clamped", "free").
     preset : {"seed", "accurate"}
-        Elements as in `brick_beam`.
+        Elements, default "accurate"; see `brick_beam`.
     divisions : LapDivisions, optional
+        Numbers of bricks.
 
     Returns
     -------
@@ -271,7 +288,12 @@ def bolted_lap(
         A dimension is not positive, the hole is not wider than the shank, the head or nut does not cover the hole or
         reaches beyond the overlap, or bricks are badly shaped.
     TypeError
-        Not a pair where one is asked for; a bolt, material or divisions of another kind.
+        A value that is not a pair; a bolt, material or divisions of a wrong type.
+
+    See Also
+    --------
+    jointfrf.workbench.cases.bolted_lap.preload.preload : Static state under preload.
+    jointfrf.workbench.solids.brick_beam.brick_beam : Model of a single beam.
 
     Examples
     --------
@@ -319,7 +341,7 @@ def bolted_lap(
 
 
 def lap_bricks(lengths: Sequence[float], height: float) -> float:
-    """Return about how many bricks beams of these lengths take with the default divisions."""
+    """Return the approximate number of bricks of beams with the default divisions."""
     bricks = LapDivisions()
     return bricks.across * bricks.layers * _PER_HEIGHT * sum(lengths) / height
 
@@ -355,7 +377,7 @@ def _check_dimensions(
 
 
 def _radii(hole: float, bolt: Bolt, reach: float, bricks: LapDivisions) -> list[float]:
-    """Return the circles of the plan around the bolt, ascending, the hole first."""
+    """Return the radii of the circles around the bolt in ascending order, the hole first."""
     small, large = sorted((bolt.head_radius, bolt.nut_radius))
     radii: list[float] = np.linspace(hole, small, bricks.rings + 1).tolist()
     radii += [large] if large > small else []
@@ -365,14 +387,14 @@ def _radii(hole: float, bolt: Bolt, reach: float, bricks: LapDivisions) -> list[
 def _shared_plan(
     overlap: float, width: float, heights: tuple[float, float], radii: list[float], bricks: LapDivisions, start: float
 ) -> Plan:
-    """Return the plan of the overlap, the same for both beams so that their nodes coincide."""
+    """Return the plan of the overlap, equal for both beams so that their nodes coincide."""
     along = max(1, round(overlap / min(heights) * _PER_HEIGHT))
     plan = holed_plan(overlap, width, overlap / 2, radii, (bricks.across, along))
     return Plan(plan.points + np.array([start, 0.0]), plan.quads)
 
 
 def _beam(shared: Plan, span: tuple[float, float], width: float, height: float, bricks: LapDivisions) -> Plan:
-    """Return the plan of a beam: the overlap and the strip outside it."""
+    """Return the plan of a beam: the overlap, and the rectangle outside the overlap."""
     length = span[1] - span[0]
     if length < NEAR * height:
         return shared
@@ -410,7 +432,7 @@ def _check_quality(name: str, mesh: Mesh) -> None:
 
 
 def _joined(solids: dict[str, Mesh]) -> tuple[Mesh, NDArray[np.str_]]:
-    """Return one mesh of bodies that keep their own nodes, and the body of every element."""
+    """Return one mesh of bodies that share no nodes, and the body of every element."""
     starts = np.cumsum([0, *(len(solid.nodes) for solid in solids.values())])
     elements = [solid.elements + start for solid, start in zip(solids.values(), starts, strict=False)]
     body = np.repeat(list(solids), [len(solid.elements) for solid in solids.values()])
@@ -419,7 +441,7 @@ def _joined(solids: dict[str, Mesh]) -> tuple[Mesh, NDArray[np.str_]]:
 
 
 def _interfaces(mesh: Mesh, body: NDArray[np.str_], heights: tuple[float, float]) -> dict[str, ContactInterface]:
-    """Return the faces that touch, found by their planes."""
+    """Return the interfaces, identified by their planes."""
     faces, elements = mesh.faces()
     near = NEAR * min(heights)
     planes: dict[str, float] = {"head": heights[0], "lap": 0.0, "nut": -heights[1]}
@@ -431,7 +453,7 @@ def _interfaces(mesh: Mesh, body: NDArray[np.str_], heights: tuple[float, float]
         distance, nearest = cKDTree(mesh.nodes[nodes]).query(mesh.nodes[partner])
         touching = distance < near
         quads = above[np.isin(above, partner[touching]).all(axis=1)]
-        # A corner of a quad that is no neighbour of a touching one belongs to no pair.
+        # A node without a quadrilateral in contact belongs to no pair.
         kept = touching & np.isin(partner, quads)
         found[name] = ContactInterface(
             lower=nodes[nearest[kept]], upper=partner[kept], area=_node_areas(mesh.nodes, quads, partner[kept])

@@ -1,4 +1,4 @@
-"""Bolted lap joint under preload: the static state, and the linear model about it."""
+"""Static state of a bolted lap joint under preload, and the linear model about it."""
 
 from __future__ import annotations
 
@@ -23,19 +23,20 @@ __all__ = ["PreloadedLap", "preload"]
 
 
 class PressureMap(NamedTuple):
-    """Pressure on the two faces of an interface, which is the same on both.
+    """Contact pressure of an interface.
 
     Attributes
     ----------
     points : ndarray, shape (n, 2)
-        z and x before loading, m.
+        Coordinates z and x before loading, m.
     quads : ndarray of int, shape (n_quads, 4)
-        Corners, counted in `points`.
+        Corners of the quadrilaterals, as positions in `points`.
     pressure : ndarray, shape (n,)
-        Pa; 0 at open pairs.
+        Pressure, Pa; 0 at open pairs.
     closed, slipping : ndarray of bool, shape (n,)
+        Pairs in contact, and slipping pairs.
     nodes : ndarray of int, shape (n,)
-        Nodes of the mesh, on the upper body, counted from 0.
+        Nodes of the mesh on the upper body, counted from 0.
     """
 
     points: FloatArray
@@ -53,18 +54,20 @@ class PreloadedLap:
     Attributes
     ----------
     lap : BoltedLap
+        Mesh of the lap joint.
     force : float
         Preload, N.
     law : ContactLaw
+        Contact law of all interfaces.
     elongation : float
-        Length over which the two halves of the shank were drawn over each other at the cut, m: the stretch of the bolt
-        and the compression of the clamped parts.
+        Overlap of the two halves of the shank at the cut, m. It is the sum of the elongation of the bolt and the
+        compression of the clamped parts.
     displacement : ndarray, shape (n_nodes, 3)
-        m. On the plane of the cut: of the upper half of the shank.
+        Displacements of the nodes, m. Nodes at the cut have the displacement of the upper half of the shank.
     interfaces : dict of str to InterfaceState
-        "head", "lap" and "nut", in the order of the pairs of `lap.interfaces`.
+        States of "head", "lap" and "nut", with the pairs in the order of `lap.interfaces`.
     history : tuple of Iteration
-        Iterations of the contact; the last one agrees with its own contacts.
+        Iterations of the active set; no contact changes in the last iteration.
     """
 
     lap: BoltedLap
@@ -82,7 +85,7 @@ class PreloadedLap:
         return float(np.linalg.norm((self.lap.mesh.nodes[nodes] - self.lap.axis)[:, [0, 2]], axis=1).max())
 
     def pressure_maps(self) -> dict[str, PressureMap]:
-        """Return the contact pressure on "head" (upper face of A), "lap" and "nut" (lower face of B) in plan view."""
+        """Return the contact pressure of "head" (upper face of A), "lap" and "nut" (lower face of B) in plan view."""
         nodes, (faces, _) = self.lap.mesh.nodes, self.lap.mesh.faces()
         height = nodes[:, 1]
         flat = faces[np.ptp(height[faces], axis=1) < NEAR * np.ptp(height)]
@@ -98,19 +101,19 @@ class PreloadedLap:
         return maps
 
     def model(self) -> SolidModel:
-        """Linear model for small vibrations about this state, the shank locked at its length.
+        """Return the linear model for small vibrations about this state, with a fixed length of the shank.
 
         Returns
         -------
         SolidModel
-            DOFs ``"node:x"``. `expansion` gives the displacements of all nodes.
+            Model with DOFs ``"1:x"``. `SolidModel.expansion` gives the displacements of all nodes.
 
         Notes
         -----
-        The springs of the law connect closed pairs along y, and sticking pairs also along x and z; a rigid law
-        eliminates the upper node instead. Slipping pairs are free along x and z, open pairs in all directions. A loss
-        factor that all materials share applies to the whole stiffness, including the springs between faces; otherwise
-        these springs have none.
+        Springs of the contact law connect closed pairs along y, and sticking pairs also along x and z. A rigid law
+        eliminates the upper node. Slipping pairs are free along x and z, open pairs in all directions. If all materials
+        have the same loss factor, it applies to the whole stiffness, including the springs between faces. Otherwise
+        these springs have no loss factor.
         """
         formulation = PRESETS[self.lap.preset]
         bodies = solid_model(
@@ -137,16 +140,18 @@ class PreloadedLap:
 
 
 def preload(lap: BoltedLap, force: float, law: ContactLaw | None = None, *, max_iterations: int = 50) -> PreloadedLap:
-    """Tighten the bolt of a lap joint.
+    """Return the static state of a lap joint under the preload of its bolt.
 
     Parameters
     ----------
     lap : BoltedLap
+        Mesh of the lap joint.
     force : float
         Preload, N; see `preload_force`.
     law : ContactLaw, optional
-        Law of all three interfaces; ``ContactLaw()`` by default.
+        Contact law of all three interfaces, default ``ContactLaw()``.
     max_iterations : int
+        Largest number of iterations, default 50.
 
     Returns
     -------
@@ -158,15 +163,21 @@ def preload(lap: BoltedLap, force: float, law: ContactLaw | None = None, *, max_
         A force that is not positive; no clamped end; contact that does not converge, opens everywhere, or leaves a body
         free to move.
     TypeError
-        A lap or a law of another kind.
+        A lap or a law of a wrong type.
+
+    See Also
+    --------
+    jointfrf.workbench.cases.bolted_lap.lap.bolted_lap : Mesh of a lap joint.
+    jointfrf.workbench.cases.bolted_lap.lap.preload_force : Preload force of a bolt.
+    jointfrf.workbench.cases.bolted_lap.contact.solve_contact : Static equilibrium with contact.
 
     Notes
     -----
-    The shank is cut at the plane between the beams. Its halves are drawn over each other by one unknown length, on
-    which the preload acts as force; afterwards this length is locked, and bodies and contacts are linear about this
-    state: `PreloadedLap.model`. The bolt needs no artificial support, since all contacts begin closed and sticking.
+    The shank is cut at the plane between the beams. The overlap of its halves is one unknown length, and the preload is
+    the force on it. `PreloadedLap.model` then fixes this length and linearises bodies and contacts about this state.
+    The bolt needs no artificial support, because all contacts are initially closed and sticking.
 
-    Results of the case study (3840 bricks, "accurate", 22784 N), with faces of finite stiffness and with rigid ones:
+    Results of the case study (3840 bricks, "accurate", 22784 N), with faces of finite stiffness and with rigid faces:
 
     ================================  ==========  =====  =====  =====  =====  =====  =====  =====
     law                               elongation  natural frequencies, Hz
@@ -175,7 +186,7 @@ def preload(lap: BoltedLap, force: float, law: ContactLaw | None = None, *, max_
     ``ContactLaw(0.3, None, None)``   74.1 um     14.68  60.56  87.43  261.4  349.5  488.7  555.5
     ================================  ==========  =====  =====  =====  =====  =====  =====  =====
 
-    Every pair sticks in the first, 80 of 400 closed pairs slip in the second, at the edges of head and nut.
+    Every pair sticks with the first law. With the second, 80 of 400 closed pairs slip, at the edges of head and nut.
 
     Examples
     --------
@@ -212,7 +223,7 @@ def preload(lap: BoltedLap, force: float, law: ContactLaw | None = None, *, max_
 
 
 def _cut(lap: BoltedLap, formulation: Formulation) -> tuple[FloatArray, float]:
-    """Return the forces on all DOFs, and along itself, of drawing the lower half of the shank up by 1 m at the cut."""
+    """Return the forces on all DOFs, and on the overlap itself, due to an overlap of 1 m at the cut of the shank."""
     nodes, elements = lap.mesh.nodes, lap.mesh.elements[lap.elements("bolt")]
     height = nodes[:, 1] - lap.axis[1]
     near = NEAR * np.ptp(height)

@@ -22,7 +22,7 @@ __all__ = ["above_limit", "build_figures", "build_numbers", "build_summary", "bu
 
 
 def build_tables(result: BoltedLapResult) -> list[Table]:
-    """Build all tables."""
+    """Return all tables."""
     transfer = f"Transfer to a beam B of {result.case.beams.lengths[2]:g} m"
     return [
         _contact(result),
@@ -127,7 +127,7 @@ def _noise(result: BoltedLapResult) -> Table:
 
 
 def above_limit(frequency_error: float) -> str:
-    """Write an error (4.12) that is the limit of the search."""
+    """Return the text of an error (4.12) that is the limit of the search."""
     return f"above {number(float(frequency_error), 2)}"
 
 
@@ -161,7 +161,7 @@ def _unmeasured(result: BoltedLapResult) -> Table:
 
 
 def build_numbers(result: BoltedLapResult) -> dict[str, Any]:
-    """Return the numbers of a case for JSON, beside its tables."""
+    """Return the numbers of a case for JSON, without its tables."""
     return {
         "n_dofs": result.n_dofs,
         "preload_newton": result.state.force,
@@ -171,7 +171,7 @@ def build_numbers(result: BoltedLapResult) -> dict[str, Any]:
 
 
 def build_summary(result: BoltedLapResult, tables: list[Table]) -> list[Table]:
-    """Return short tables: how much fits, the preload, and the largest errors of the resonances."""
+    """Return short tables with the number of rows that fit, the preload, and the largest errors of the resonances."""
     fits = agreement(tables)
     return [*([fits] if fits.rows else []), _preload(result), _worst_errors(result)]
 
@@ -201,7 +201,7 @@ def _worst_errors(result: BoltedLapResult) -> Table:
 
 
 def _worst(result: BoltedLapResult, named: tuple[str, str], direction: str, transferred: bool) -> str:
-    """Write the largest error (4.12) of a resonance in a direction, percent."""
+    """Return the text of the largest error (4.12) of a resonance in a direction, percent."""
     peaks = result.transferred_peaks if transferred else result.peaks
     one = next(r for r in result.regenerated if r.found[:2] == named)
     errors = one.transferred_errors if transferred else one.errors
@@ -210,7 +210,7 @@ def _worst(result: BoltedLapResult, named: tuple[str, str], direction: str, tran
     return number(worst, 2) if errors.found[own].all() else above_limit(worst)
 
 
-#: Routes and estimators whose FRFs are drawn, and their styles.
+#: Routes and estimators in figures of FRFs, and their styles.
 _DRAWN = (
     (("Measurements 1-4", "band mean"), "ismm"),
     (("virtual points", "compliance fit"), "compliance"),
@@ -231,7 +231,7 @@ _FACES = {"head": "under the head", "lap": "between the beams", "nut": "under th
 
 
 def build_figures(result: BoltedLapResult) -> list[Figure]:
-    """Build all figures."""
+    """Return all figures."""
     makers: tuple[Callable[[BoltedLapResult], Iterator[Figure]], ...] = (
         _pressure, _regenerated, _lines, _unmeasured_frfs, _noise_frfs,
     )  # fmt: skip
@@ -333,7 +333,7 @@ def _noise_frfs(result: BoltedLapResult) -> Iterator[Figure]:
             intervals.append(Interval(f"{study.route},\n{study.estimator}", *percentiles(study.shift[:, p])))
         title = f"{peak.direction}, {peak.freq_hz:.3g} Hz"
         panels.append(Panel(title, "frequency error (4.12), %", "", intervals=tuple(intervals)))
-    # One range for all: a resonance that is off by a tenth is to look different from one that is off by a thousandth.
+    # All panels have the same range, so that errors of 10 % and of 0.1 % look different.
     every = [interval.high for panel in panels for interval in panel.intervals]
     panels = [replace(panel, x_limits=(0.0, 1.05 * max(every))) for panel in panels]
     if panels and result.noisy:

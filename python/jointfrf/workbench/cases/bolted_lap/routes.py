@@ -1,4 +1,4 @@
-"""From measured points to the joint: DOFs of both sides, several routes to K*(w), two estimators of constants."""
+"""Joint from measured points: DOFs of both sides, several routes to K*(w), and two estimators of constants."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ __all__ = [
 
 #: Directions x, y, z.
 _AXES = np.eye(3)
-#: Names of the methods of a case in tables, and their routes to the FRFs of the joint DOFs.
+#: Names of the methods in tables, and their routes to the FRFs of the joint DOFs.
 ESTIMATORS = {
     "ismm": ("band mean", ("Measurements 1-4", "central differences", "virtual points", "multi-point")),
     "compliance": ("compliance fit", ("central differences", "virtual points")),
@@ -46,14 +46,14 @@ ESTIMATORS = {
 
 @dataclass(frozen=True)
 class FivePoints:
-    """Five triaxial points on one side of the joint: rp in the middle, 1 and 3 along z, 2 and 4 along x (figure 4-40).
+    """Five triaxial points on one side of the joint: rp at the centre, 1 and 3 along z, 2 and 4 along x (figure 4-40).
 
     Attributes
     ----------
     centre : ndarray, shape (3,)
-        Reference point rp, m.
+        Coordinates of the reference point rp, m.
     spacing : tuple of float
-        s_x and s_z: from rp to its neighbours, m.
+        Distances s_x and s_z from rp to the neighbouring points, m.
     """
 
     centre: FloatArray
@@ -61,7 +61,7 @@ class FivePoints:
 
     @cached_property
     def points(self) -> FloatArray:
-        """Positions of rp, 1, 2, 3, 4, shape (5, 3), m."""
+        """Return the positions of rp, 1, 2, 3, 4, shape (5, 3), m."""
         s_x, s_z = self.spacing
         offsets = np.array([[0, 0, 0], [0, 0, -s_z], [-s_x, 0, 0], [0, 0, s_z], [s_x, 0, 0]])
         placed: FloatArray = self.centre + offsets
@@ -69,15 +69,15 @@ class FivePoints:
 
     @property
     def channels(self) -> tuple[FloatArray, FloatArray]:
-        """Positions and directions of the 15 channels, x, y, z of each point; both of shape (15, 3)."""
+        """Return positions, m, and directions of the 15 channels, x, y, z of each point; both of shape (15, 3)."""
         return np.repeat(self.points, 3, axis=0), np.tile(_AXES, (5, 1))
 
     @cached_property
     def differences(self) -> FloatArray:
-        """Transformation (6, 15) to the joint DOFs by second-order central differences (4.14), (4.18).
+        """Return the transformation (6, 15) to the joint DOFs by second-order central differences (4.14), (4.18).
 
-        Rotations in a right-handed system: theta_y = +du_x/dz, theta_z = +du_y/dx, but theta_x = -du_y/dz, where the
-        source has the sign of (4.14) for all of them.
+        Rotations are right-handed: theta_y = +du_x/dz, theta_z = +du_y/dx, but theta_x = -du_y/dz. The source uses the
+        sign of (4.14) for all rotations.
         """
         s_x, s_z = self.spacing
         along_x, along_z = difference_weights(s_x)[1], difference_weights(s_z)[1]
@@ -91,14 +91,14 @@ class FivePoints:
 
     @cached_property
     def virtual_point(self) -> VirtualPoint:
-        """Rigid motion of all five points about rp, by least squares."""
+        """Return the virtual point of the rigid motion of all five points about rp, by least squares."""
         return virtual_point(*self.channels, self.centre, DOFS)
 
 
 def measured_entries() -> NDArray[np.bool_]:
-    """Entries of the receptance between six DOFs that Measurements 1-4 give (4.28), shape (6, 6).
+    """Return the mask of entries of the receptance of six DOFs that Measurements 1-4 give (4.28), shape (6, 6).
 
-    x with theta_y, y with theta_x and with theta_z, z alone. All others stay zero.
+    The entries connect x with theta_y, y with theta_x and with theta_z, and z with itself. All other entries are zero.
     """
     known = np.eye(6, dtype=bool)
     for a, b in (("x", "theta_y"), ("y", "theta_x"), ("y", "theta_z")):
@@ -115,16 +115,18 @@ def both_sides(j: FivePoints, k: FivePoints) -> tuple[FloatArray, FloatArray]:
 
 
 class Found(NamedTuple):
-    """A joint as one route and one estimator see it.
+    """Joint identified by one route and one estimator.
 
     Attributes
     ----------
     route : str
-        How the FRFs of the joint DOFs were obtained.
+        Route from measured FRFs to FRFs of the joint DOFs.
     estimator : {"band mean", "compliance fit"}
+        Estimator of the constants.
     theta : ndarray, shape (12,)
         Stiffness of the six DOFs, then damping.
     std_error : ndarray, shape (12,), or None
+        Standard errors of `theta`; None for band means.
     """
 
     route: str
@@ -136,16 +138,25 @@ class Found(NamedTuple):
 def route_lines(
     points: tuple[FivePoints, FivePoints], h: ComplexArray, reference: ComplexArray | None = None
 ) -> dict[str, ComplexArray]:
-    """K* line by line by every route, shape (n_freq, 6, 6).
+    """Return K* line by line by every route.
 
     Parameters
     ----------
     points : tuple of FivePoints
-        Sides j and k.
+        Measured points on sides j and k.
     h : ndarray, shape (n_freq, 30, 30)
-        FRFs between their channels, m/N.
+        Receptances between the channels of the points, m/N.
     reference : ndarray, shape (n_freq, 12, 12), optional
-        FRFs of six-DOF reference points, which cannot be measured.
+        Receptances of six-DOF reference points, which cannot be measured, m/N.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n_freq, 6, 6)
+        K*(w) by the name of the route, N/m.
+
+    See Also
+    --------
+    by_band_means, by_compliance_fit : Constants of the joint.
     """
     by_differences, by_virtual_points = both_sides(*points)
     differences = by_differences @ h @ by_differences.T
@@ -161,14 +172,14 @@ def route_lines(
 
 
 def joint_stiffness_lines(gamma: ComplexArray) -> ComplexArray:
-    """K* = -(gamma^-1)_jk, which ISMM reduces to whatever the first estimate."""
+    """Return K* = -(gamma^-1)_jk, the result of ISMM for any first estimate."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IllConditionedWarning)
         return inverse_substructuring(gamma, on_singular="nan")
 
 
 def _multi_point(points: tuple[FivePoints, FivePoints], h: ComplexArray) -> ComplexArray:
-    """K* of the equivalent multi-point connection: six forces pass the joint."""
+    """Return K* of the equivalent multi-point connection with six forces in the joint."""
     j, k = (side.virtual_point for side in points)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)
@@ -176,12 +187,12 @@ def _multi_point(points: tuple[FivePoints, FivePoints], h: ComplexArray) -> Comp
 
 
 def by_band_means(case: BoltedLapCase, k_lines: Mapping[str, ComplexArray]) -> list[Found]:
-    """Constants of every route as means over bands."""
+    """Return the constants of every route as means over bands."""
     return [Found(route, "band mean", case.bands.means(case.freq_hz, k)) for route, k in k_lines.items()]
 
 
 def by_compliance_fit(case: BoltedLapCase, points: tuple[FivePoints, FivePoints], h: ComplexArray) -> list[Found]:
-    """Constants by fits in the compliance domain over all lines, by differences and by virtual points."""
+    """Return constants by fits of the compliance over all lines, for central differences and for virtual points."""
     found = []
     for route, transform in zip(("central differences", "virtual points"), both_sides(*points), strict=True):
         fit = fit_measured(case.freq_hz, case.joint.dofs, h, transform)
@@ -190,32 +201,36 @@ def by_compliance_fit(case: BoltedLapCase, points: tuple[FivePoints, FivePoints]
     return found
 
 
-#: Relative noise for the weights of a fit whose noise level is not of interest.
+#: Relative noise that sets the weights of a fit; its level does not affect the parameters.
 _ASSUMED = 0.01
-#: Least variance of an FRF as a share of that of its driving points: entries that are zero have no noise of their own.
+#: Least variance of an FRF as a fraction of the variance of its driving points, because zero entries have no noise.
 _ROUNDING = 1e-20
 
 
 def fit_measured(freq_hz: FloatArray, dofs: tuple[str, ...], h: ComplexArray, transform: FloatArray) -> Fit:
-    """Fit a joint to FRFs between measured channels; its warnings are part of the result.
+    """Return the fit of a joint to FRFs between measured channels; warnings are suppressed.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequency lines, Hz.
     dofs : tuple of str
         Names of the n joint DOFs.
     h : ndarray, shape (n_freq, m, m)
         Receptances between the channels, m/N.
     transform : ndarray, shape (2 n, m)
-        From the channels to joint DOFs j, then k.
+        Transformation from the channels to the joint DOFs j, then k.
 
     Returns
     -------
     Fit
+
+    See Also
+    --------
+    route_lines : K* line by line.
     """
     gamma = transform @ h @ transform.T
-    # Of each FRF between joint DOFs by itself: the covariance of all of many channels takes ten times as long.
+    # Variance of each FRF between joint DOFs; the covariance matrix of many channels takes ten times as long.
     variance = transform**2 @ (_ASSUMED * abs(h)) ** 2 @ (transform**2).T
     largest = np.sqrt(np.diagonal(variance.max(axis=0)))
     variance = np.maximum(variance, _ROUNDING * np.outer(largest, largest))

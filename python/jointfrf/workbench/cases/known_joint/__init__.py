@@ -1,15 +1,15 @@
-"""Two simulated substructures and a joint of known parameters, identified from noisy FRFs, many times over.
+"""Two simulated substructures and a joint of known parameters, identified from many realisations of noisy FRFs.
 
-keys          the keys of its files, and the case as data
-exact         FRFs without noise, K*(w) line by line by each method, and how exact the equations are
-decoupling    the fit to all FRFs between internal points, and its bound
-realisations  many realisations of the noise: identified parameters, for cases and for studies
-regenerate    FRFs of the assembly from identified and from printed parameters, and their errors
-modes         mode shapes of the assembly, and drawings of them
-compute       the result; sensitivity of the observed FRFs to the joint
-expected      the comparison with `expected.toml`: published numbers, and errors that follow from printed parameters
-tables        the tables
-figures       the figures
+keys          keys of the files, and the case as data
+exact         FRFs without noise, K*(w) line by line by each method, and errors without noise
+decoupling    fit to all FRFs between internal points, and its bound
+realisations  identified parameters of many realisations of the noise, for cases and for studies
+regenerate    FRFs of the assembly from identified and from published parameters, and their errors
+modes         mode shapes of the assembly, and their panels
+compute       result, and sensitivity of the observed FRFs to the joint
+expected      comparison with `expected.toml`: published numbers, and errors from published parameters
+tables        tables
+figures       figures
 """
 
 from jointfrf.workbench.cases.keys import METHODS

@@ -26,14 +26,14 @@ __all__ = ["KnownJointResult", "SensitiveBands", "known_joint_result", "sensitiv
 
 @dataclass(frozen=True)
 class SensitiveBands:
-    """Sensitivities of the observed FRFs to a joint, and the bands that follow.
+    """Sensitivities of the observed FRFs to a joint, and the proposed bands.
 
     Attributes
     ----------
     sensitivities : dict
-        Key of an observed FRF to Sensitivity.
+        Sensitivity by the key of an observed FRF.
     proposals : dict
-        Key of an observed FRF, and Parameter, to bands, Hz.
+        Proposed bands, Hz, by the key of an observed FRF and Parameter.
     """
 
     sensitivities: dict[str, Sensitivity]
@@ -41,16 +41,22 @@ class SensitiveBands:
 
 
 def sensitive_bands(case: KnownJointCase, exact: Exact, joint: Joint, h_c: ComplexArray) -> SensitiveBands:
-    """Sensitivities and proposed bands of all observed FRFs.
+    """Return sensitivities and proposed bands of all observed FRFs.
 
     Parameters
     ----------
     case : KnownJointCase
+        Case with the observed FRFs.
     exact : Exact
+        Receptances of the substructures.
     joint : Joint
-        The actual joint, or its first estimate.
+        Actual joint, or its first estimate.
     h_c : ndarray, shape (n_freq, 4 n, 4 n)
-        Receptance of the assembly with this joint, DOFs as in `Exact`, m/N.
+        Receptance of the assembly with this joint, m/N; DOFs in the order of `Exact`.
+
+    Returns
+    -------
+    SensitiveBands
     """
     j, k = (list(range(exact.where(point).start, exact.where(point).stop)) for point in "jk")
     found = {}
@@ -72,19 +78,24 @@ class KnownJointResult:
     Attributes
     ----------
     case : KnownJointCase
+        Case with its keys.
     exact : Exact
+        FRFs without noise.
     n_realisations : int
+        Number of realisations of each noise.
     modes : dict
-        ``"initial"`` and ``"actual"`` joint to ModeShapes; empty without models.
+        ModeShapes with the ``"initial"`` and the ``"actual"`` joint; empty without models.
     sensitive : dict
-        ``"initial"`` and ``"actual"`` joint to SensitiveBands: before the identification, a user has the first
-        estimate only.
+        SensitiveBands with the ``"initial"`` and the ``"actual"`` joint. Before the identification, a user has only
+        the first estimate.
     identified : list of Identified
+        Joints by noise, method and set of bands.
     regenerated : list of RegeneratedFrf
+        FRFs regenerated from the identified joints.
     printed : list of PrintedErrors
-        FRFs regenerated from published parameters.
+        Errors of FRFs regenerated from published parameters.
     noise_free : dict
-        Method to NoiseFree.
+        NoiseFree by method.
     """
 
     case: KnownJointCase
@@ -99,7 +110,7 @@ class KnownJointResult:
 
 
 def known_joint_result(computed: Computed[KnownJointCase, Exact]) -> KnownJointResult:
-    """Return the result of a case whose realisations are under way; processes do all this at the same time."""
+    """Return the result of a case; the work runs in the processes that also compute the realisations."""
     case, exact, workers = computed.case, computed.frfs, computed.workers
     initial = workers.begin(sensitive_bands, case, exact, case.initial, exact.h_initial)
     actual = workers.begin(sensitive_bands, case, exact, case.joint, exact.h_c)

@@ -1,4 +1,4 @@
-"""The fit to all FRFs between internal points, given those of the substructures, and its Cramer-Rao bound."""
+"""Fit to all FRFs between internal points with known FRFs of the substructures, and its Cramer-Rao bound."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ def decoupling_fits(
     k_initial: ComplexArray,
     first: Iterable[ComplexArray],
 ) -> RealisationFits:
-    """Return fits of stiffness and viscous damping to FRFs between internal points, given those of the substructures.
+    """Return fits of stiffness and viscous damping to FRFs between internal points.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequency lines, Hz.
     dofs : tuple of str
         Names of the n joint DOFs.
     substructures : pair of ndarray, shape (n_freq, 2 n, 2 n)
@@ -43,19 +43,45 @@ def decoupling_fits(
     k_initial : ndarray, shape (n_freq, n, n)
         First estimate of K*, N/m.
     first : iterable of ndarray, shape (n_freq, 2 n, 2 n)
-        Sets of receptances of the assembly at r, then s, m/N, fitted without initial values until one fits: there all
-        others start.
+        Sets of receptances of the assembly at r, then s, m/N. They are fitted one after another until a fit
+        succeeds; its parameters are the initial values of all later fits.
+
+    Returns
+    -------
+    RealisationFits
+
+    See Also
+    --------
+    fit_decoupling : Parameters from several sets of receptances.
+    decoupling_bound : Cramer-Rao bound of the fit.
 
     Notes
     -----
-    What (2.53)-(2.56) take one block each is one maximum-likelihood fit of all four.
+    Each of the equations (2.53)-(2.56) uses one block of the receptances. The maximum-likelihood fit uses all four.
     """
     whole, channels = _decoupled(freq_hz, dofs, substructures, k_initial)
     return RealisationFits(freq_hz, whole, channels, first)
 
 
 def fit_decoupling(fits: RealisationFits, measured: Iterable[ComplexArray]) -> FloatArray:
-    """Return stiffness of all DOFs, then damping, of several sets of such receptances, shape (r, 2 n)."""
+    """Return the parameters of several sets of receptances.
+
+    Parameters
+    ----------
+    fits : RealisationFits
+        Fits of `decoupling_fits`.
+    measured : iterable of ndarray, shape (n_freq, 2 n, 2 n)
+        Sets of receptances of the assembly at r, then s, m/N.
+
+    Returns
+    -------
+    ndarray, shape (r, 2 n)
+        Stiffness of all DOFs, then damping, one row for each set.
+
+    See Also
+    --------
+    decoupling_fits : Fits with the initial values.
+    """
     found = [fits.joint(h).constant_joint() for h in measured]
     return np.array([[*joint.stiffness.diagonal(), *joint.damping.diagonal()] for joint in found])
 
@@ -63,7 +89,7 @@ def fit_decoupling(fits: RealisationFits, measured: Iterable[ComplexArray]) -> F
 def _decoupled(
     freq_hz: FloatArray, dofs: tuple[str, ...], substructures: tuple[ComplexArray, ComplexArray], k_joint: ComplexArray
 ) -> tuple[Assembly, Channels]:
-    """Return substructures by their FRFs, with springs and dashpots near to K*, and the channels at r, then s."""
+    """Return the assembly of measured substructures and a joint close to K*, and the channels at r, then s."""
     joint, inner = [f"joint {dof}" for dof in dofs], [f"inner {dof}" for dof in dofs]
     a, b = (Substructure.of_frfs(freq_hz, h, [*joint, *inner], joint, noise=0.0) for h in substructures)
     diagonal = np.einsum("laa->la", k_joint)
@@ -84,12 +110,25 @@ def decoupling_bound(
 
     Parameters
     ----------
-    freq_hz, dofs, substructures
-        As of `decoupling_fits`.
+    freq_hz : ndarray, shape (n_freq,)
+        Frequency lines, Hz.
+    dofs : tuple of str
+        Names of the n joint DOFs.
+    substructures : pair of ndarray, shape (n_freq, 2 n, 2 n)
+        Receptances of A at j, then r, and of B at k, then s, m/N.
     k_joint : ndarray, shape (n_freq, n, n)
-        The actual K* of springs and dashpots, N/m.
+        Actual K* of springs and dashpots, N/m.
     variance : ndarray, shape (n_freq, 2 n, 2 n)
-        E|e|^2 of circular noise, (m/N)^2, independent between the FRFs; 0 for FRFs that are zero.
+        Variance E|e|^2 of circular noise that is independent between the FRFs, (m/N)^2; 0 for FRFs that are zero.
+
+    Returns
+    -------
+    ndarray, shape (2 n,)
+        Relative standard deviations of the stiffness of all DOFs, then of the damping.
+
+    See Also
+    --------
+    decoupling_bounds : Bounds of all noises of a case.
     """
     whole, channels = _decoupled(freq_hz, dofs, substructures, k_joint)
     prediction = Prediction(whole, freq_hz, channels.responses, channels.forces)
@@ -103,10 +142,26 @@ def decoupling_bound(
 
 
 def decoupling_bounds(case: KnownJointCase, exact: Exact) -> dict[str, FloatArray]:
-    """Return relative standard deviations of all parameters, shape (2 n,), by the name of the noise.
+    """Return the Cramer-Rao bound of the decoupling fit for each noise of a case.
 
-    Noise of which FRFs share numbers, in blocks or by reciprocity, has another bound, and is left out. FRFs that are
-    zero by symmetry say nothing.
+    The bound assumes independent noise of the FRFs, so noise that is equal within blocks or reciprocal is left out.
+    FRFs that are zero by symmetry contain no information.
+
+    Parameters
+    ----------
+    case : KnownJointCase
+        Case with its noises.
+    exact : Exact
+        FRFs without noise.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (2 n,)
+        Relative standard deviations of all parameters by the name of the noise.
+
+    See Also
+    --------
+    decoupling_bound : Bound for given variances.
     """
     h = measured(exact, "decoupling-fit")
     shown = np.zeros(h.shape[1:], bool)

@@ -1,4 +1,4 @@
-"""FRFs of a case without noise, those that each method takes, and K*(w) by it."""
+"""FRFs of a case without noise, the FRFs that each method uses, and K*(w) by each method."""
 
 from __future__ import annotations
 
@@ -34,24 +34,24 @@ __all__ = [
     "noise_stream",
 ]
 
-#: Joint points of A and B, j and k, and internal ones, r and s, as the thesis names them.
+#: Joint points j and k and internal points r and s of A and B, in the notation of the thesis.
 _POINTS = "jrks"
 
 
 @dataclass(frozen=True)
 class Exact:
-    """Noise-free FRFs of a case; DOFs in the order j, r of A, then k, s of B, n of each.
+    """FRFs of a case without noise, with n DOFs at each of the points j, r of A and k, s of B, in this order.
 
     Attributes
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequency lines, Hz.
     dofs : tuple of str
         Names of the n joint DOFs.
     h_a, h_b : ndarray, shape (n_freq, 2 n, 2 n)
         Receptances of the substructures, m/N.
     h_initial, h_c : ndarray, shape (n_freq, 4 n, 4 n)
-        Receptances of the assembly with the first estimate and with the actual joint.
+        Receptances of the assembly with the first estimate and with the actual joint, m/N.
     k_initial : ndarray, shape (n_freq, n, n)
         First estimate of K*, N/m.
     """
@@ -88,7 +88,7 @@ class Exact:
 
 
 def exact_frfs(case: KnownJointCase) -> Exact:
-    """Receptances of the substructures (2.28)-(2.29) and of the assembly (2.26)."""
+    """Return receptances of the substructures (2.28)-(2.29) and of the assembly (2.26)."""
     freq, n = case.freq_hz, len(case.joint.dofs)
     h_a = case.a.receptance(freq, case.points["j"] + case.points["r"])
     h_b = case.b.receptance(freq, case.points["k"] + case.points["s"])
@@ -99,27 +99,28 @@ def exact_frfs(case: KnownJointCase) -> Exact:
     return Exact(freq, case.joint.dofs, h_a, h_b, h_initial, h_c, initial)
 
 
-#: Translation whose slope along an axis of space is a rotation, and the sign of it.
+#: Translations whose slope along an axis is a rotation, with the sign of the slope.
 _SLOPES = {"theta_x": ("z", 1, 1.0), "theta_y": ("z", 0, -1.0), "theta_z": ("y", 0, 1.0)}
-#: A node stands for a place that is off by less than this share of the spacing.
+#: Largest distance between a node and the place of a neighbour, as a fraction of the spacing.
 _NEAR = 0.05
 
 
 def frfs_by_differences(case: KnownJointCase, spacing: float) -> ComplexArray:
-    """Return FRFs of the assembly at the joint whose rotations are differences of translations over a spacing.
+    """Return FRFs of the assembly at the joint, with rotations from finite differences of translations.
 
-    Central differences (2.57) where there are nodes on both sides, of one side at the end of a part.
+    Differences are central (2.57) between nodes on both sides, and one-sided at the end of a part.
 
     Parameters
     ----------
     case : KnownJointCase
+        Case with models of both substructures.
     spacing : float
-        From the joint to its neighbours, m.
+        Distance from the joint to the neighbouring points, m.
 
     Returns
     -------
     ndarray, shape (n_freq, 2 n, 2 n)
-        DOFs j, then k.
+        Receptances at the joint DOFs j, then k, m/N.
 
     Raises
     ------
@@ -141,7 +142,7 @@ def frfs_by_differences(case: KnownJointCase, spacing: float) -> ComplexArray:
 
 
 def _dof_weights(structure: Structure, dofs: Sequence[str], spacing: float) -> list[dict[str, float]]:
-    """Return which DOFs each DOF is a sum of, and their weights."""
+    """Return for each DOF the DOFs of its finite difference, with their weights."""
     found = []
     for dof in dofs:
         node, _, direction = dof.rpartition(":")
@@ -160,7 +161,7 @@ def _dof_weights(structure: Structure, dofs: Sequence[str], spacing: float) -> l
                 ends.add(nearest)
         if not ends:
             raise ValueError(
-                f"no node lies {spacing:g} m beside {node} along {'xyz'[axis]} for rotation {dof}; change the spacing"
+                f"no node lies {spacing:g} m from {node} along {'xyz'[axis]} for rotation {dof}; change the spacing"
             )
         nodes = sorted(ends) if len(ends) == 2 else [node, *ends]
         slopes = difference_weights([places[one][axis] - places[node][axis] for one in nodes])[1]
@@ -168,27 +169,34 @@ def _dof_weights(structure: Structure, dofs: Sequence[str], spacing: float) -> l
     return found
 
 
-#: Equal up to rounding, and without the model: (2.47) and its short form.
+#: Short form of (2.47), which is equal up to rounding and needs no model.
 SHORT_FORM = {"ismm": "inverse-substructuring"}
 
-#: What fits take from a model.
+#: FRFs that fits use from a model.
 _OF_FITS: dict[str, tuple[str, ...]] = {"compliance": (), "decoupling-fit": ("h_a", "h_b")}
-#: Methods that take FRFs of the coupled structure at internal points.
+#: Methods that use FRFs of the assembly at internal points.
 _DECOUPLING = tuple(name for name, method in STIFFNESS_METHODS.items() if method.measured == "h_c")
 
 
 def measured(exact: Exact, method: str) -> ComplexArray:
-    """FRFs of the assembly that a method takes.
+    """Return the FRFs of the assembly that a method uses.
 
     Parameters
     ----------
     exact : Exact
+        FRFs without noise.
     method : str
+        Name of the method.
 
     Returns
     -------
-    ndarray, shape (n_freq, n, n) for decoupling by an equation, else (n_freq, 2 n, 2 n)
-        Between the internal points that the equation names; at r, then s; at joint DOFs j, then k. m/N.
+    ndarray, shape (n_freq, n, n) or (n_freq, 2 n, 2 n)
+        Receptances, m/N. Decoupling by an equation uses n x n receptances between the internal points of the equation.
+        The decoupling fit uses the points r, then s; all other methods use the joint DOFs j, then k.
+
+    See Also
+    --------
+    joint_lines : K*(w) from these FRFs.
     """
     if method == "decoupling-fit":
         at = np.r_[exact.where("r"), exact.where("s")]
@@ -200,7 +208,7 @@ def measured(exact: Exact, method: str) -> ComplexArray:
 
 
 def needed_frfs(exact: Exact, method: str) -> Exact:
-    """Leave out the FRFs that a method does not take from a model: a task goes to another process."""
+    """Return a copy with only the FRFs that a method uses from a model, to send less to other processes."""
     needed = _OF_FITS[method] if method in FITTED else STIFFNESS_METHODS[cast(StiffnessMethod, method)].model
     slim = exact if "alpha" in needed else replace(exact, h_initial=exact.h_initial[:0])
     slim = replace(slim, h_c=exact.h_c[:0])
@@ -208,28 +216,33 @@ def needed_frfs(exact: Exact, method: str) -> Exact:
 
 
 def noise_stream(method: str) -> int:
-    """Return what a method adds to the seed: FRFs at other points have noise of their own."""
+    """Return the number that a method adds to the seed; FRFs at different points get different noise."""
     names = [*(str(name) for name in _DECOUPLING), "decoupling-fit"]
     return 1 + names.index(method) if method in names else 0
 
 
 def joint_lines(exact: Exact, method: str, h: ComplexArray, on_singular: OnSingular = "raise") -> ComplexArray:
-    """K* by a method, for several sets of measured FRFs.
+    """Return K* by a method, for several sets of measured FRFs.
 
     Parameters
     ----------
     exact : Exact
-        What the method knows of the substructures, or of the assembly with the first estimate.
+        Known FRFs of the substructures, or of the assembly with the first estimate.
     method : str
-        A key of `STIFFNESS_METHODS`.
+        Key of `STIFFNESS_METHODS`.
     h : ndarray, shape (r, n_freq, m, m)
-        FRFs as `measured` returns them, with noise or without.
+        Receptances of `measured`, with or without noise, m/N.
     on_singular : {"raise", "nan"}
+        Treatment of singular lines, default "raise".
 
     Returns
     -------
     ndarray, shape (r, n_freq, n, n)
-        N/m.
+        K*(w) of each set, N/m.
+
+    See Also
+    --------
+    measured : FRFs that a method uses.
     """
     count, n_freq, n = len(h), exact.freq_hz.size, exact.n
     joint, inner = range(n), range(n, 2 * n)
@@ -250,19 +263,19 @@ def joint_lines(exact: Exact, method: str, h: ComplexArray, on_singular: OnSingu
 
 
 class NoiseFree(NamedTuple):
-    """Largest relative error of K* without noise, and how much K* changes when the last bits of the FRFs do."""
+    """Largest relative error of K* without noise, and relative change of K* by rounding of the FRFs."""
 
     error: float
     rounding: float
 
 
 def noise_free_errors(exact: Exact, k_actual: ComplexArray) -> dict[str, NoiseFree]:
-    """Find the largest relative error of K* of every method without noise.
+    """Return the largest relative error of K* without noise, by method.
 
-    "short form" is the difference between (2.47) and -(gamma^-1)_jk; the others are errors against the actual K*.
+    "short form" is the difference between (2.47) and -(gamma^-1)_jk. All other values are errors of the actual K*.
     """
     with warnings.catch_warnings():
-        # What a poor condition does is what is shown.
+        # The errors show the effect of ill-conditioned lines.
         warnings.simplefilter("ignore", IllConditionedWarning)
         found, changed = _all_methods(exact), _all_methods(_rounded(exact))
     size = np.sqrt(abs(np.diagonal(k_actual, axis1=1, axis2=2)))
@@ -278,7 +291,7 @@ def noise_free_errors(exact: Exact, k_actual: ComplexArray) -> dict[str, NoiseFr
 
 
 def _rounded(exact: Exact) -> Exact:
-    """Change every FRF by a rounding, up or down, always the same."""
+    """Return FRFs with reproducible rounding errors, up or down."""
     rng = np.random.default_rng(1)
     h_a, h_b, h_initial, h_c = (
         h * (1 + np.finfo(float).eps * rng.choice((-1.0, 1.0), h.shape))
@@ -288,5 +301,5 @@ def _rounded(exact: Exact) -> Exact:
 
 
 def _all_methods(exact: Exact) -> dict[str, ComplexArray]:
-    """K* on every line by every method."""
+    """Return K* on every line by every method."""
     return {method: joint_lines(exact, method, measured(exact, method)[None])[0] for method in STIFFNESS_METHODS}

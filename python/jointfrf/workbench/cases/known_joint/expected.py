@@ -1,4 +1,4 @@
-"""Results of a case of a known joint compared with its `expected.toml`: one table for each source of numbers."""
+"""Comparison of a case of a known joint with its `expected.toml`, in one table for each source of numbers."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ __all__ = [
 NO_PEAK = "no peak in the band"
 #: Joints by their names in tables.
 JOINT_NAMES = {"initial": "first estimate", "actual": "actual"}
-#: Headings of distributions: of values, and of errors, which have three digits.
+#: Headings of distributions of values, and of errors with three digits.
 SPREAD = ("median", "2.5 %", "97.5 %")
 SPREAD_OF_ERRORS = ("median, %", *SPREAD[1:])
 #: A sensitive region fits if its sensitivity is twice as large, dB.
@@ -94,7 +94,7 @@ def _belongs(table: ExpectedParameters, found: Identified) -> bool:
 
 
 def identified_rows(result: KnownJointResult) -> list[Row]:
-    """Return rows for every parameter, method, noise level and set of bands, with the number of the source if any."""
+    """Return one row for every parameter, method, noise level and set of bands, with its published value, if any."""
     rows = []
     for found in result.identified:
         published = [table for table in result.case.expected.identified if table.values and _belongs(table, found)]
@@ -149,7 +149,7 @@ def _published_parameters(rows: list[Row]) -> list[Table]:
 
 
 def rmse_limits(result: KnownJointResult, rows: list[Row]) -> list[Table]:
-    """Return the table of root-mean-square errors and their limits; none without limits."""
+    """Return the table of root-mean-square errors and their limits; an empty list without limits."""
     compared = []
     for table in result.case.expected.identified:
         for name, limit in table.rmse_below.items():
@@ -165,7 +165,7 @@ def rmse_limits(result: KnownJointResult, rows: list[Row]) -> list[Table]:
 
 
 def spread_of_errors(errors: FloatArray, published: float | None = None) -> tuple[tuple[Cell, ...], bool | None]:
-    """Return median, 2.5 and 97.5 percentile and rank of the errors of a peak, and whether the published one fits.
+    """Return median, 2.5 and 97.5 percentile and rank of the errors of a peak, and the verdict on the published error.
 
     Realisations without a peak in the band are left out; if more than half have none, the median is `NO_PEAK`.
     """
@@ -177,7 +177,7 @@ def spread_of_errors(errors: FloatArray, published: float | None = None) -> tupl
 
 
 def _published_errors(result: KnownJointResult) -> list[Table]:
-    """Return the errors of regenerated FRFs of the source, next to the distributions; with the first set of bands."""
+    """Return published errors of regenerated FRFs next to the distributions, with the first set of bands."""
     columns = ("FRF", "band, Hz", "method", "error", "thesis, %", *SPREAD_OF_ERRORS, "percentile")
     note = (
         "Errors of one realisation in the thesis; ours are a distribution over realisations with a peak in "
@@ -204,7 +204,7 @@ def _published_errors(result: KnownJointResult) -> list[Table]:
 
 
 def _errors_of_printed_parameters(result: KnownJointResult) -> list[Table]:
-    """Return the table of FRFs regenerated from printed parameters; none if there are none."""
+    """Return the table of FRFs regenerated from printed parameters; an empty list without such parameters."""
     lines = result.case.expected.printed
     if lines is None or not result.printed:
         return []
@@ -237,7 +237,7 @@ def _errors_of_printed_parameters(result: KnownJointResult) -> list[Table]:
 
 
 def _regions(result: KnownJointResult) -> list[Table]:
-    """Return the regions that the source finds sensitive."""
+    """Return the tables of the published sensitive regions."""
     of_joints = (f"{joint}: {what}" for joint in JOINT_NAMES.values() for what in ("proposed, Hz", "inside, dB"))
     columns = ("parameter", "FRF", "region, Hz", *of_joints)
     note = (
@@ -264,24 +264,24 @@ def _region_rows(result: KnownJointResult, known: ExpectedRegions) -> Iterator[C
 
 
 def contrast(freq_hz: FloatArray, change: ComplexArray, region: Band, regions: Sequence[Band]) -> float | None:
-    """How much more sensitive an FRF is inside a region than outside all of them, dB.
+    """Return the sensitivity of an FRF inside a region relative to the sensitivity outside all regions, dB.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
-        Hz.
+        Frequency lines, Hz.
     change : ndarray, shape (n_freq,)
-        A row of `Sensitivity.change`.
+        Row of `Sensitivity.change`.
     region : (low, high)
-        Hz.
+        Limits of the region, Hz.
     regions : sequence of (low, high)
-        All that the source names for the parameter, Hz.
+        All published regions of the parameter, Hz.
 
     Returns
     -------
     float or None
-        Median of the modulus over the lines inside, relative to that over the lines outside; medians, since resonances
-        and antiresonances are narrow. None where a median is zero, or no line is outside.
+        Median of the modulus over the lines inside, divided by the median over the lines outside, dB. Medians are used
+        because resonances and antiresonances are narrow. None if a median is zero, or if no line is outside.
     """
     outside = ~in_bands(freq_hz, regions)
     if not outside.any():
@@ -291,5 +291,5 @@ def contrast(freq_hz: FloatArray, change: ComplexArray, region: Band, regions: S
 
 
 def proposed_bands(sensitive: SensitiveBands, observed: Observed, parameter: Parameter) -> str:
-    """Return the bands proposed for a parameter from an observed FRF, in words."""
+    """Return the text of the bands that are proposed for a parameter from an observed FRF."""
     return bands_in_words(sensitive.proposals[observed.key, parameter]) or "none"

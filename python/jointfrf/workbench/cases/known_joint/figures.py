@@ -1,4 +1,4 @@
-"""The figures of a case of a known joint, as data."""
+"""Figures of a case of a known joint, as data."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from jointfrf.workbench.report.receptance import ReceptanceCurve, noise_figure, 
 
 __all__ = ["build_figures"]
 
-#: Methods as legends name them, with the equations of the thesis.
+#: Names of the methods in legends, with the equations of the thesis.
 _METHOD_NAMES = {
     "ismm": "ISMM",
     "ismm-kj": "ISMM, D_kj",
@@ -45,13 +45,13 @@ _METHOD_NAMES = {
     "decoupling-ss": "decoupling (2.56)",
     "decoupling-fit": "fit of (2.53)-(2.56)",
 }
-#: Methods of which a single realisation is drawn, too.
+#: Methods whose figures also show a single realisation.
 _SINGLE = ("ismm", "decoupling-ss")
-#: Stiffness of the curves beside the actual one in a sensitivity figure.
+#: Stiffness of the additional curves in a sensitivity figure, relative to the actual stiffness.
 _VARIED = ((0.5, "low"), (2.0, "high"))
 #: Panels that still fit on a page.
 _ONE_FIGURE = 6
-#: Joint DOFs whose FRFs across the joint are drawn beside their driving points.
+#: Joint DOFs whose FRFs across the joint are drawn in addition to the driving-point FRFs.
 _BOTH_SIDES = 3
 #: Noise levels side by side.
 _MOST_LEVELS = 3
@@ -60,7 +60,7 @@ _UNMOVED = 1e-4
 
 
 def build_figures(result: KnownJointResult) -> list[Figure]:
-    """Build all figures of a case that its data allow.
+    """Return the figures of a case; figures without data are left out.
 
     Parameters
     ----------
@@ -77,18 +77,18 @@ def build_figures(result: KnownJointResult) -> list[Figure]:
 
 
 def _label(result: KnownJointResult, observed: Observed) -> str:
-    """Label of an axis."""
+    """Return the label of an axis."""
     return modulus_label(observed.point * 2, result.case.joint.dofs[observed.dof])
 
 
 def _place(result: KnownJointResult, observed: Observed) -> str:
-    """Where an observed FRF is taken, in words."""
+    """Return the position of an observed FRF in words."""
     named = "" if observed.key == observed.point else f", {result.case.joint.dofs[observed.dof]}"
     return f"point {observed.point}{named}"
 
 
 def _curve(result: KnownJointResult, label: str, h: ComplexArray, observed: Observed, style: str) -> ReceptanceCurve:
-    """Draw an observed FRF among those of the assembly."""
+    """Return the curve of an observed FRF from the FRFs of the assembly."""
     at = result.exact.at(observed)
     return ReceptanceCurve(label, result.exact.freq_hz, h[:, at, at], style)
 
@@ -117,7 +117,7 @@ def _polluted(result: KnownJointResult) -> Iterator[Figure]:
     exact = result.exact
     gamma = exact.interface(exact.h_c)
     extent = exact.freq_hz[-1] - exact.freq_hz[0]
-    # Noise does not show on the whole range: one tenth of it is drawn large beside.
+    # Noise is invisible on the whole range, so one tenth of the range is also drawn enlarged.
     close = (exact.freq_hz[0] + 0.45 * extent, exact.freq_hz[0] + 0.55 * extent)
     inside = (exact.freq_hz >= close[0]) & (exact.freq_hz <= close[1])
     label = modulus_label("jj", exact.dofs[0])
@@ -136,7 +136,7 @@ def _polluted(result: KnownJointResult) -> Iterator[Figure]:
 
 
 def _noise_found(result: KnownJointResult) -> Iterator[Figure]:
-    """Noise that the polluted FRFs show of themselves, of the first level: one response a joint DOF."""
+    """Yield the noise estimated from polluted FRFs of the first noise level, with one response for each joint DOF."""
     exact, n = result.exact, len(result.case.joint.dofs)
     if not result.case.noises:
         return
@@ -161,7 +161,7 @@ def _sensitivities(result: KnownJointResult) -> Iterator[Figure]:
 
 
 def _varied_panels(result: KnownJointResult, one: Observed, d: int) -> tuple[Panel, Panel]:
-    """Draw an FRF with the actual stiffness of a DOF, with less and with more."""
+    """Return panels of an FRF with the actual stiffness of a DOF, with less and with more."""
     exact, parameter = result.exact, result.case.parameters[d]
     name = symbol(parameter)
     curves = [_curve(result, f"actual {name}", exact.h_c, one, "actual")]
@@ -175,7 +175,7 @@ def _varied_panels(result: KnownJointResult, one: Observed, d: int) -> tuple[Pan
 
 
 def _sensitivity_panel(result: KnownJointResult, one: Observed, stiffness: Parameter, damping: Parameter) -> Panel:
-    """Draw the sensitivity of an FRF to stiffness and damping of a DOF, and the bands that follow."""
+    """Return the panel of the sensitivity of an FRF to stiffness and damping of a DOF, with the proposed bands."""
     sensitive = result.sensitive
     actual, initial = (sensitive[joint].sensitivities[one.key].in_db for joint in ("actual", "initial"))
     drawn = ((stiffness, actual, "", "stiffness"), (stiffness, initial, ", first estimate", "stiffness-initial"),
@@ -197,20 +197,20 @@ def _sensitivity_panel(result: KnownJointResult, one: Observed, stiffness: Param
 
 
 def _shades(result: KnownJointResult, parameter: Parameter) -> NamedBands:
-    """Bands of a parameter, each once, the widest below."""
+    """Return the bands of a parameter without duplicates, the widest first."""
     different = dict.fromkeys(tuple(band_set.bands[parameter]) for band_set in result.case.band_sets)
     widest = sorted(different, key=lambda bands: -sum(high - low for low, high in bands))
     return tuple((f"band {bands_in_words(bands)} Hz", bands) for bands in widest)
 
 
 def _lines(result: KnownJointResult, found: Identified, p: int) -> FloatArray:
-    """Re K* or Im K*/w of parameter p over frequency, shape (n_kept, n_freq)."""
+    """Return Re K* or Im K*/w of parameter p over frequency, shape (n_kept, n_freq)."""
     k_lines = found.k_lines[:, :, p % result.exact.n]
     return parameter_lines(k_lines, result.exact.freq_hz, result.case.parameters[p])
 
 
 def _line_panel(result: KnownJointResult, found: Identified, p: int, within: tuple[Band, ...] | None) -> Panel:
-    """Draw an identified parameter over frequency: everywhere, or inside bands with its mean."""
+    """Return the panel of an identified parameter over all frequencies, or inside bands with its mean."""
     freq, parameter, lines = result.exact.freq_hz, result.case.parameters[p], _lines(result, found, p)
     actual, median = float(result.case.actual[p]), float(np.median(found.theta[:, p]))
     inside = np.ones(freq.size, bool)
@@ -238,7 +238,7 @@ def _line_panel(result: KnownJointResult, found: Identified, p: int, within: tup
 
 
 def _known_and_fitted(result: KnownJointResult, noise: str, p: int) -> tuple[tuple[Level, ...], tuple[Ribbon, ...]]:
-    """Draw the actual value of a parameter, and what the compliance fit finds over realisations of a noise."""
+    """Return the level of the actual parameter, and the ribbon of the compliance fits over realisations of a noise."""
     levels = [Level("actual", float(result.case.actual[p]), "actual")]
     fits = [f for f in result.identified if (f.noise, f.method) == (noise, "compliance")]
     ribbons = []
@@ -251,7 +251,7 @@ def _known_and_fitted(result: KnownJointResult, noise: str, p: int) -> tuple[tup
 
 
 def _identified(result: KnownJointResult) -> Iterator[Figure]:
-    """Figures of the first noise level and the first method with values line by line."""
+    """Yield figures of the first noise level and the first method with values line by line."""
     by_band = [f for f in result.identified if f.k_lines.size]
     if not by_band:
         return
@@ -289,7 +289,7 @@ def _noise(result: KnownJointResult) -> Iterator[Figure]:
 
 
 def _methods(result: KnownJointResult) -> Iterator[Figure]:
-    """Compare methods line by line, where there are several that work line by line."""
+    """Yield the comparison of methods line by line, if at least two methods work line by line."""
     if not result.case.band_sets:
         return
     first_noise, first_set = result.case.noises[0].name, result.case.band_sets[0]
@@ -304,7 +304,7 @@ def _methods(result: KnownJointResult) -> Iterator[Figure]:
 def _method_panels(
     result: KnownJointResult, found: list[Identified], p: int, bands: tuple[Band, ...]
 ) -> tuple[Panel, ...]:
-    """One realisation of two methods, and the medians of all."""
+    """Return panels of one realisation of two methods, and of the medians of all methods."""
     freq, actual = result.exact.freq_hz, float(result.case.actual[p])
     low, high = bands[0][0], bands[-1][1]
     inside = (freq >= low) & (freq <= high)
@@ -340,7 +340,7 @@ def _regenerated(result: KnownJointResult) -> Iterator[Figure]:
 
 
 def _zoomed(result: KnownJointResult, one: Observed, found: list[RegeneratedFrf]) -> tuple[Panel, ...]:
-    """Draw one realisation of some methods and the actual FRF, in each band by itself."""
+    """Return one panel for each band with one realisation of some methods and the actual FRF."""
     freq, panels = result.exact.freq_hz, []
     lines = [("actual", _curve(result, "actual", result.exact.h_c, one, "actual").h, "actual")]
     lines += [(_METHOD_NAMES[r.identified.method], r.first, r.identified.method) for r in found]

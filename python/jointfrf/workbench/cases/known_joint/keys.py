@@ -1,4 +1,4 @@
-"""A case of a known joint: the keys of its files, and the case that they give."""
+"""Keys of the files of a case of a known joint, and the case itself."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class PointKeys(Keys):
 
 
 class ObservedKeys(Keys):
-    """FRFs of the assembly that are looked at; without any, the first DOF of r and of s."""
+    """Observed FRFs of the assembly; by default, the first DOF of r and of s."""
 
     point: Annotated[Literal["r", "s"], key("Response and force at this point.")]
     dof: Annotated[str, key("Joint DOF whose direction it is.")]
@@ -117,7 +117,7 @@ class _Applied(Keys):
 
     source: Annotated[str, key("Where the numbers come from: title of the table.")]
     noise: Annotated[str, key("Name of a noise of the case.")]
-    method: Annotated[str, key("One that the case applies to this noise.", choice=METHODS)]
+    method: Annotated[str, key("Method that the case applies to this noise.", choice=METHODS)]
 
 
 class ExpectedParameters(_Applied):
@@ -137,13 +137,13 @@ class ExpectedParameters(_Applied):
 class ExpectedErrors(_Applied, rename={"bands": "band"}):
     """Published errors (4.11), (4.12) of a regenerated FRF in a band."""
 
-    observed: Annotated[str, key("An FRF that the case looks at: `s`, `s-Fx`.")]
-    bands: Annotated[Bands, key("One of its bands.", "Hz", takes="list of one `[low, high]`")]
+    observed: Annotated[str, key("Observed FRF of the case: `s`, `s-Fx`.")]
+    bands: Annotated[Bands, key("One of the bands of this FRF.", "Hz", takes="list of one `[low, high]`")]
     amplitude: Annotated[float | None, key("Error (4.11).", "%", absent="not published")] = None
     frequency: Annotated[float | None, key("Error (4.12).", "%", absent="not published")] = None
     offset: Annotated[
         tuple[float, float, float] | None,
-        key("Where the FRF is seen, from its reference point: x, y, z.", "m", absent="at the point"),
+        key("Offset of the FRF from its reference point: x, y, z.", "m", absent="at the point"),
     ] = None
 
     @property
@@ -153,11 +153,11 @@ class ExpectedErrors(_Applied, rename={"bands": "band"}):
 
 
 class ExpectedRegions(Keys, rename={"name": "parameter"}):
-    """Where the source finds an FRF sensitive to a parameter."""
+    """Published bands in which an FRF is sensitive to a parameter."""
 
     source: Annotated[str, key("Where the regions come from: title of the table.")]
     name: Annotated[str, key("Parameter of the joint.", takes="`k_DOF` or `c_DOF`")]
-    observed: Annotated[str, key("An FRF that the case looks at: `s`, `s-Fx`.")]
+    observed: Annotated[str, key("Observed FRF of the case: `s`, `s-Fx`.")]
     bands: Annotated[Bands, key("The regions.", "Hz")]
 
     @property
@@ -167,21 +167,21 @@ class ExpectedRegions(Keys, rename={"name": "parameter"}):
 
 
 class PrintedLines(Keys):
-    """How errors of FRFs regenerated from published parameters are compared with the published errors."""
+    """Comparison of errors of FRFs regenerated from published parameters with the published errors."""
 
     step: Annotated[Positive, key("Spacing of the lines.", "Hz")]
-    amplitude_within_percent: Annotated[NotNegative, key("How far error (4.11) may be off, of itself.", "%")]
-    lines_within: Annotated[NotNegative, key("How many lines error (4.12) may be off.")]
+    amplitude_within_percent: Annotated[NotNegative, key("Largest relative difference of error (4.11).", "%")]
+    lines_within: Annotated[NotNegative, key("Largest difference of error (4.12), in lines.")]
 
 
 class JointFrequencies(ExpectedFrequencies):
     """Natural frequencies of the assembly; both substructures must be models."""
 
-    joint: Annotated[Literal["actual", "initial"], key("With which joint.")]
+    joint: Annotated[Literal["actual", "initial"], key("Joint of these frequencies.")]
 
 
 class KnownJointExpected(ExpectedKeys):
-    """What is known about a case beforehand; the file may be missing."""
+    """Expected results of a case; the file may be missing."""
 
     frequencies: Annotated[tuple[JointFrequencies, ...], key("Natural frequencies.")] = ()
     identified: Annotated[tuple[ExpectedParameters, ...], key("Published parameters.")] = ()
@@ -199,21 +199,24 @@ class KnownJointExpected(ExpectedKeys):
 
 @dataclass(frozen=True, kw_only=True)
 class KnownJointCase(Case, WithActualJoint):
-    """A simulated identification.
+    """Case of a simulated identification.
 
     Attributes
     ----------
     a, b : Structure
+        Substructures.
     points : mapping of str to tuple of str
-        Names of the joint DOFs, "j" in A and "k" in B, and of internal ones, "r" in A and "s" in B.
+        Names of the joint DOFs, "j" in A and "k" in B, and of internal DOFs, "r" in A and "s" in B.
     joint, initial : Joint
-        The actual joint and its first estimate.
+        Actual joint and its first estimate.
     observed : tuple of Observed
-        FRFs of the assembly that are looked at.
+        Observed FRFs of the assembly.
     band_sets : tuple of BandSet
-        The first is that of the tables.
+        Sets of bands; tables use the first.
     noises : tuple of Noise
+        Noises, each with its methods.
     expected : KnownJointExpected
+        Published numbers.
     """
 
     a: Structure
@@ -228,13 +231,13 @@ class KnownJointCase(Case, WithActualJoint):
 
     @property
     def models(self) -> tuple[ModelStructure, ModelStructure] | None:
-        """Both substructures where both are known by their models, else None."""
+        """Both substructures if both have models, otherwise None."""
         a, b = self.a, self.b
         return (a, b) if isinstance(a, ModelStructure) and isinstance(b, ModelStructure) else None
 
 
 def read_known_joint(common: Case, keys: KnownJointKeys, expected: KnownJointExpected) -> KnownJointCase:
-    """Return the case that its files give; raises FileContentError."""
+    """Return the case of its files; raise FileContentError if they are invalid."""
     a, b = (one.structure(common.freq_hz) for one in (keys.substructure_a, keys.substructure_b))
     methods = list(dict.fromkeys(method for noise in keys.noise for method in noise.methods))
     joint, initial = joints_of(keys.joint, next(filter(_begins_with_estimate, methods), ""))
@@ -290,7 +293,7 @@ def _observed(keys: KnownJointKeys, dofs: tuple[str, ...], freq_hz: FloatArray) 
 
 
 def _check_expected(case: KnownJointCase) -> None:
-    """Check that what is expected belongs to the case."""
+    """Raise an error if `expected.toml` does not match the case."""
     expected, methods = case.expected, {noise.name: noise.methods for noise in case.noises}
     parameters, observed = [one.name for one in case.parameters], {one.key: one.bands for one in case.observed}
     for name in ("frequencies", "printed"):

@@ -1,4 +1,4 @@
-"""Undamped modes of the assembly, and panels that draw them: beams as lines, solids as shaded surfaces."""
+"""Undamped modes of the assembly, and their panels: beams as lines, solids as shaded surfaces."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from jointfrf.workbench.solids.solid import SolidModel
 
 __all__ = ["ModeShapes", "find_modes", "mode_panels", "modes_of_case"]
 
-#: Modes shown, unless more are expected.
+#: Number of modes in figures, unless `expected.toml` contains more.
 _SHOWN = 5
-#: Modes below this share of the highest one sought are rigid-body motions: round-off of a fine mesh gives them some.
+#: Modes below this fraction of the highest frequency are rigid-body motions; rounding makes them nonzero.
 _RIGID = 1e-3
-#: Points of a mode shape on each beam; elements bend cubically between their nodes.
+#: Points of a mode shape on each beam; deflections are cubic between the nodes.
 _SHAPE_POINTS = 100
-#: Limits of deflections, whose largest is 1.
+#: Axis limits of deflections with maximum 1.
 _DEFLECTIONS = (-1.15, 1.15)
 
 
@@ -32,12 +32,13 @@ class ModeShapes:
     Attributes
     ----------
     freq_hz : ndarray, shape (n,)
-        Hz.
+        Natural frequencies, Hz.
     shapes : ndarray, shape (n_dofs, n)
+        Mode shapes, one column for each mode.
     dofs : tuple of str
         Names of the DOFs.
     directions : tuple of str
-        Where a solid moves most in each mode, "x", "y" or "z"; empty for other models.
+        Direction of the largest motion of a solid in each mode, "x", "y" or "z"; empty for other models.
     """
 
     freq_hz: FloatArray
@@ -47,9 +48,10 @@ class ModeShapes:
 
 
 def modes_of_case(case: KnownJointCase) -> dict[str, ModeShapes]:
-    """Modes of the assembly through the first estimate ("initial") and the "actual" joint, some at least.
+    """Return the modes of the assembly with the first estimate ("initial") and with the "actual" joint.
 
-    As many as are expected; none where a substructure is known by its receptances only.
+    The number of modes is the number in `expected.toml`, or a small default if that is larger. The result is empty if
+    a substructure has receptances but no model.
     """
     if case.models is None:
         return {}
@@ -65,7 +67,7 @@ def modes_of_case(case: KnownJointCase) -> dict[str, ModeShapes]:
 
 
 def find_modes(model: Model, count: int) -> ModeShapes:
-    """Lowest undamped modes, rigid-body motions left out."""
+    """Return the lowest undamped modes without rigid-body motions."""
     freq, shapes = model.modes(min(count + 3, len(model.dofs)))
     kept = np.flatnonzero(freq > _RIGID * freq.max(initial=0))[:count]
     return ModeShapes(freq[kept], shapes[:, kept], model.dofs)
@@ -79,7 +81,7 @@ def _solids(case: KnownJointCase) -> tuple[SolidModel, SolidModel] | None:
 
 
 def _with_directions(modes: ModeShapes, a: SolidModel, b: SolidModel) -> ModeShapes:
-    """Name the direction in which the reference points of solids move most: in torsion it is not that of the edges."""
+    """Return modes with the direction of the largest motion of reference points; edges move differently in torsion."""
     names = {*a.references, *b.references}
     at = [[i for i, dof in enumerate(modes.dofs) if dof[2:] in {f"{name}:{axis}" for name in names}] for axis in "xyz"]
     squares = [(modes.shapes[rows] ** 2).sum(axis=0) for rows in at]
@@ -87,13 +89,14 @@ def _with_directions(modes: ModeShapes, a: SolidModel, b: SolidModel) -> ModeSha
 
 
 def mode_panels(case: KnownJointCase, modes: ModeShapes) -> tuple[str, list[Panel]]:
-    """Draw mode shapes of solids or of beams.
+    """Return the panels of mode shapes of solids or beams.
 
     Returns
     -------
     caption : str
+        Caption of the figure.
     panels : list of Panel
-        One a mode; none for models that have no shape.
+        One panel for each mode; empty for models without geometry.
     """
     solids = _solids(case)
     if solids is not None:
@@ -119,7 +122,7 @@ def _solid_panels(modes: ModeShapes, a: SolidModel, b: SolidModel) -> list[Panel
 
 
 def _beam_panels(modes: ModeShapes, x_a: FloatArray, x_b: FloatArray) -> list[Panel]:
-    """Draw both beams in one line, B where A ends."""
+    """Return panels of both beams in one line; B begins at the end of A."""
     panels = []
     for mode, freq in enumerate(modes.freq_hz):
         shape = dict(zip(modes.dofs, modes.shapes[:, mode], strict=True))

@@ -1,4 +1,4 @@
-"""Realisations of the noise, identified by several methods: sources of estimates, for cases and for studies."""
+"""Estimates by several methods from realisations of the noise, for cases and for studies."""
 
 from __future__ import annotations
 
@@ -42,28 +42,28 @@ from jointfrf.workbench.cases.known_joint.keys import KnownJointCase
 
 __all__ = ["ALL_LINES", "Identified", "chunk_size", "estimate_groups", "identified_joints"]
 
-#: Lines, and entries of their FRF matrices, treated at once, over realisations: bound the memory to some tens of MB.
+#: Most lines, and entries of their FRF matrices, in one chunk of realisations; limits memory to some tens of MB.
 _CHUNK, _CHUNK_ENTRIES = 20_000, 1_500_000
-#: Realisations whose K*(w) is kept line by line, for figures.
+#: Number of realisations whose K*(w) is kept line by line for figures.
 _KEPT = 200
-#: The bands of a fit that takes every line.
+#: Name of the bands of a fit that uses every line.
 ALL_LINES = "all lines"
 
 
 @dataclass(frozen=True)
 class Identified:
-    """Joints that one method identifies at one noise level, with one set of bands.
+    """Parameters identified by one method at one noise level with one set of bands.
 
     Attributes
     ----------
     noise, method, bands : str
-        Names.
+        Names of the noise, the method and the set of bands.
     theta : ndarray, shape (n_realisations, n_parameters)
-        Parameters: stiffness of all DOFs, then damping.
+        Stiffness of all DOFs, then damping.
     k_lines : ndarray, shape (n_kept, n_freq, n)
         Diagonal of K* line by line for the first realisations; empty for a fit over all lines.
     theta_kj : ndarray, shape (n_realisations, n_parameters) or (0, n_parameters)
-        For "ismm", which takes K* from D_jk: the parameters from D_kj of the same FRFs.
+        Parameters of "ismm" from the block D_kj, in addition to the block D_jk; empty for other methods.
     """
 
     noise: str
@@ -75,7 +75,7 @@ class Identified:
 
 
 def chunk_size(n_freq: int, entries: int) -> int:
-    """Return how many realisations of `n_freq` lines, with so many entries each, are treated at once."""
+    """Return the number of realisations in one chunk, with `n_freq` lines and so many entries for each line."""
     return max(1, min(_CHUNK, _CHUNK_ENTRIES // entries) // n_freq)
 
 
@@ -85,13 +85,18 @@ def identified_joints(case: KnownJointCase, found: Sequence[GroupEstimates]) -> 
     Parameters
     ----------
     case : KnownJointCase
+        Case with noises, methods and bands.
     found : sequence of GroupEstimates
         Estimates of the groups that `estimate_groups` returns without a choice.
 
     Returns
     -------
     list of Identified
-        One for each noise, method and set of bands (`ALL_LINES` for fits).
+        One object for each noise, method and set of bands (`ALL_LINES` for fits).
+
+    See Also
+    --------
+    estimate_groups : Groups of estimates.
     """
     joints = []
     n = len(case.joint.dofs)
@@ -110,22 +115,24 @@ def identified_joints(case: KnownJointCase, found: Sequence[GroupEstimates]) -> 
     return joints
 
 
-#: Starts of fits that a process keeps; those of decoupling hold derivatives of all FRFs.
+#: Numbers of initial fits in the cache of a process; decoupling fits are large because they contain derivatives.
 _STARTS, _DECOUPLING_STARTS = 32, 2
-#: Realisations that a decoupling fit may begin with: of one in some hundred the residual does not look like noise.
+#: Number of realisations tried as the initial fit of decoupling; about one in some hundred has no noise-like residual.
 _TRIES = 3
 
 
 @dataclass(frozen=True)
 class NoisyFrfs:
-    """Realisations of the FRFs that a method takes.
+    """Realisations of the FRFs that a method uses.
 
     Attributes
     ----------
     h : ndarray, shape (n_freq, m, m)
         Exact FRFs, m/N.
     noise : Noise or callable
+        Noise of the case, or `Pollution` of the user.
     seed : int
+        Seed of the noise.
     """
 
     h: ComplexArray
@@ -141,15 +148,18 @@ class NoisyFrfs:
 
 @dataclass(frozen=True)
 class BandMeanSource:
-    """Means of K* over bands, of many realisations side by side.
+    """Means of K* over bands, for many realisations in one call.
 
     Attributes
     ----------
     exact : Exact
-        Without the FRFs that the method does not take.
+        FRFs that the method uses from a model.
     method : str
+        Name of the method.
     frfs : NoisyFrfs
+        Realisations of the measured FRFs.
     band_sets : tuple of BandSet
+        Sets of bands.
     """
 
     exact: Exact
@@ -158,9 +168,9 @@ class BandMeanSource:
     band_sets: tuple[BandSet, ...]
 
     def __call__(self, first: int, count: int) -> Estimates:
-        """Compute as many realisations in one call as lie in the cache, always the same ones together.
+        """Return estimates of realisations, computed in fixed chunks that fit into the cache.
 
-        Lines are computed side by side, and one among different neighbours differs by rounding.
+        The rounding of a line depends on the other lines of its chunk, so chunks do not depend on the call.
         """
         size = self.side_by_side
         start = first - first % size
@@ -169,11 +179,11 @@ class BandMeanSource:
 
     @property
     def side_by_side(self) -> int:
-        """Realisations computed in one call."""
+        """Number of realisations computed in one call."""
         return chunk_size(self.exact.freq_hz.size, self.frfs.h[0].size)
 
     def details(self, first: int, count: int) -> tuple[Estimates, list[ComplexArray]]:
-        """Compute some realisations; return the diagonal of K* line by line of those that figures draw, too."""
+        """Return estimates of realisations, and the diagonal of K* line by line of the realisations in figures."""
         k_joint = self._lines(first, count)
         kept = max(0, min(count, _KEPT - first))
         drawn = np.diagonal(k_joint[:kept], axis1=2, axis2=3).copy()
@@ -181,7 +191,7 @@ class BandMeanSource:
 
     def _lines(self, first: int, count: int) -> ComplexArray:
         with warnings.catch_warnings():
-            # Noise makes any line ill-conditioned now and then.
+            # Noise can make any line ill-conditioned.
             warnings.simplefilter("ignore", IllConditionedWarning)
             return joint_lines(self.exact, self.method, self.frfs(first, count), "nan")
 
@@ -191,13 +201,14 @@ class BandMeanSource:
 
 @dataclass(frozen=True)
 class FitSource:
-    """Fits, each begun where that of an early realisation ends: a result depends on no other.
+    """Fits of realisations with initial values from an early realisation, so that results are independent of the call.
 
     Attributes
     ----------
     exact : Exact
-        Without the FRFs that the method does not take.
+        FRFs that the method uses from a model.
     frfs : NoisyFrfs
+        Realisations of the measured FRFs.
     """
 
     exact: Exact
@@ -205,7 +216,7 @@ class FitSource:
 
     @cached_property
     def key(self) -> str:
-        """What the start depends on."""
+        """Hash of all data that determine the initial values."""
         exact, content = self.exact, hashlib.sha256()
         for array in (exact.freq_hz, exact.h_a, exact.h_b, exact.k_initial, self.frfs.h):
             content.update(array.tobytes())
@@ -222,7 +233,7 @@ class ComplianceSource(FitSource):
     """Compliance fits."""
 
     def __call__(self, first: int, count: int) -> Estimates:
-        """Fit each realisation; the row of one that no joint fits is NaN."""
+        """Return the fit of each realisation; NaN in the row of a realisation that cannot be fitted."""
         found = np.full((3, count, 2 * self.exact.n), np.nan)
         for i, gamma in enumerate(self.frfs(first, count)):
             try:
@@ -233,14 +244,14 @@ class ComplianceSource(FitSource):
         return Estimates(*found)
 
     def details(self, first: int, count: int) -> tuple[Estimates, list[Any]]:
-        """Fit each realisation, without intervals; raise ValueError if no joint fits one."""
+        """Return the fit of each realisation without intervals; raise ValueError if one cannot be fitted."""
         theta = viscous_joints(self.exact.freq_hz, self.frfs(first, count), self.exact.dofs, _start_of(self))
         return Estimates.without_intervals(theta), []
 
 
 @lru_cache(_STARTS)
 def _start_of(source: ComplianceSource) -> FitStart | None:
-    """Fit realisation 0; None where no joint fits it."""
+    """Return the fit of realisation 0; None if it cannot be fitted."""
     try:
         return FitStart.of(source.exact.freq_hz, source.frfs(0, 1)[0], source.exact.dofs, damping="viscous")
     except (ValueError, ArithmeticError):
@@ -248,10 +259,10 @@ def _start_of(source: ComplianceSource) -> FitStart | None:
 
 
 class DecouplingFitSource(FitSource):
-    """Fits to the FRFs between internal points, given the FRFs of the substructures."""
+    """Fits to the FRFs between internal points, with known FRFs of the substructures."""
 
     def __call__(self, first: int, count: int) -> Estimates:
-        """Fit each realisation."""
+        """Return the fit of each realisation."""
         return Estimates.without_intervals(fit_decoupling(_decoupling_fits_of(self), self.frfs(first, count)))
 
 
@@ -264,7 +275,7 @@ def _decoupling_fits_of(source: DecouplingFitSource) -> RealisationFits:
 
 @dataclass(frozen=True)
 class OwnEstimatorSource:
-    """An estimator of the caller."""
+    """Estimates by an estimator of the user."""
 
     freq_hz: FloatArray
     dofs: tuple[str, ...]
@@ -272,7 +283,7 @@ class OwnEstimatorSource:
     estimator: Estimator
 
     def __call__(self, first: int, count: int) -> Estimates:
-        """Call it for each realisation."""
+        """Return the result of the estimator for each realisation."""
         drawn = self.frfs(first, count)
         found = np.array([self.estimator(self.freq_hz, gamma, self.dofs) for gamma in drawn], float)
         if found.shape != (count, 2 * len(self.dofs)):
@@ -284,7 +295,7 @@ class OwnEstimatorSource:
 
 
 def estimate_groups(case: KnownJointCase, exact: Exact, choice: StudyChoice | None) -> list[EstimateGroup]:
-    """Return every noise with every method: those of a study, or without a choice those of the report of the case."""
+    """Return a group for every noise and method of a study, or of the report of the case if `choice` is None."""
     if choice is None:
         # The report compares both blocks of the modification.
         return [
@@ -338,7 +349,7 @@ def _group(
 
 
 def _bound(exact: Exact, noise: Noise | Pollution) -> FloatArray:
-    """Return least standard deviations without a model of the sides; NaN if noise is shared, or not circular."""
+    """Return least standard deviations without models of the sides; NaN if noise is correlated or not circular."""
     missing = np.full(2 * exact.n, np.nan)
     if not isinstance(noise, Noise) or not NOISE_KINDS[noise.kind].is_circular or noise.reciprocal or noise.block > 1:
         return missing

@@ -1,4 +1,4 @@
-"""FRFs of the assembly regenerated from identified and from printed parameters, and their errors."""
+"""FRFs of the assembly, regenerated from identified and from published parameters, and their errors."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ class RegeneratedFrf:
     Attributes
     ----------
     identified : Identified
-        Without its lines.
+        Identified parameters, without K* line by line.
     observed : Observed
-        Which FRF.
+        Point, DOF and bands of the FRF.
     percentiles : ndarray, shape (3, n_freq)
-        2.5, 50 and 97.5 percentile of the modulus, m/N.
+        Percentiles 2.5, 50 and 97.5 of the modulus, m/N.
     first : ndarray, shape (n_freq,)
-        That of the first realisation.
+        FRF of the first realisation, m/N.
     bands : tuple of (low, high) or None
-        Where errors are counted, Hz; None for all lines.
+        Bands in which errors are counted, Hz; None for all lines.
     amplitude, frequency : ndarray, shape (n_bands, n_realisations)
         Errors (4.11) and (4.12), percent; NaN where the exact or the regenerated FRF has no peak in the band.
     """
@@ -58,23 +58,29 @@ class RegeneratedFrf:
 def regenerate(
     exact: Exact, theta: FloatArray, point: str, dof: int = 0, offset: tuple[float, ...] = ()
 ) -> ComplexArray:
-    """Receptance of the assembly (2.26) at a point, regenerated from parameters of the joint.
+    """Return the receptance of the assembly (2.26) at a point, regenerated from parameters of the joint.
 
     Parameters
     ----------
     exact : Exact
+        Receptances of the substructures.
     theta : ndarray, shape (r, 2 n)
-        Stiffness of all DOFs, then damping.
+        Stiffness of all DOFs, then damping, one row for each set of parameters.
     point : {"r", "s"}
+        Internal point of A or of B.
     dof : int
-        Response and force at this DOF of the point.
+        DOF of the point for response and force, default 0.
     offset : tuple of float, optional
-        Where response and force are, from the point, x, y, z in m; at the point itself by default.
+        Offset x, y, z of response and force from the point, m; none by default.
 
     Returns
     -------
     ndarray, shape (r, n_freq)
-        m/N.
+        Receptance of each set of parameters, m/N.
+
+    See Also
+    --------
+    peak_errors : Errors of a peak.
     """
     h_a, h_b = _at_joint_and_point(exact, point, _weights(exact, dof, offset))
     n, n_freq = exact.n, exact.freq_hz.size
@@ -82,20 +88,20 @@ def regenerate(
     found = np.empty((len(theta), n_freq), np.complex128)
     for first in range(0, len(theta), size):
         some = theta[first : first + size]
-        # Copied out of the coupled FRFs, which are large.
+        # A copy releases the memory of the coupled FRFs.
         found[first : first + size] = _coupled(h_a, h_b, constant_joint(some, exact.freq_hz), at)
     return found
 
 
 def _weights(exact: Exact, dof: int, offset: tuple[float, ...]) -> FloatArray:
-    """Weights of the DOFs of a point for the motion in the direction of one of them, there or beside it."""
+    """Return the weights of the DOFs of a point for the motion in the direction of one DOF, at an offset."""
     motion = rigid_offset(exact.dofs, offset) if offset else np.eye(exact.n)
     weights: FloatArray = motion[dof]
     return weights
 
 
 def _at_joint_and_point(exact: Exact, point: str, weights: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Receptances of A and B at the joint DOFs; that of the substructure with the point also there, as the last DOF."""
+    """Return receptances of A and B at the joint DOFs; the observed point is the last DOF of its substructure."""
     n = exact.n
     at_joint = np.eye(n, 2 * n)
     at_both = np.vstack([at_joint, np.concatenate([np.zeros(n), weights])])
@@ -104,12 +110,12 @@ def _at_joint_and_point(exact: Exact, point: str, weights: FloatArray) -> tuple[
 
 
 def _coupled(h_a: ComplexArray, h_b: ComplexArray, k_joint: ComplexArray, at: int) -> ComplexArray:
-    """Couple once for each set of parameters, all at once, and take one DOF: a view of the coupled FRFs."""
+    """Return the coupled FRFs at one DOF for each set of parameters, as a view."""
     count, n_freq, n, _ = k_joint.shape
     joint = list(range(n))
     many_a, many_b = (np.tile(h, (count, 1, 1)) for h in (h_a, h_b))
     with warnings.catch_warnings():
-        # Identified parameters may be absurd.
+        # Identified parameters may be far from physical values.
         warnings.simplefilter("ignore", IllConditionedWarning)
         h_c = couple(many_a, many_b, k_joint.reshape(-1, n, n), joint, joint)
     return h_c[:, at, at].reshape(count, n_freq)
@@ -127,7 +133,7 @@ def _with_errors(exact: Exact, h_exact: ComplexArray, identified: Identified, ob
 def peak_errors(h_exact: ComplexArray, h: ComplexArray, freq_hz: FloatArray, band: Band | None) -> tuple[float, float]:
     """Return the errors (4.11) and (4.12) of a peak, percent; NaN if either FRF has no peak in the band.
 
-    A largest value at the edge of a band belongs to a peak elsewhere.
+    If the largest value is at the edge of the band, the band has no peak.
     """
     if band is not None and not (has_peak(h_exact, freq_hz, band) and has_peak(h, freq_hz, band)):
         return np.nan, np.nan
@@ -137,23 +143,23 @@ def peak_errors(h_exact: ComplexArray, h: ComplexArray, freq_hz: FloatArray, ban
 def regenerate_all(
     exact: Exact, identified: list[Identified], observed: tuple[Observed, ...], workers: Workers
 ) -> list[RegeneratedFrf]:
-    """Regenerate each observed FRF from everything that was identified."""
-    # Without the lines, which are large and not needed there.
+    """Return each observed FRF, regenerated from all identified joints."""
+    # The lines are large and not needed in the processes.
     without_lines = [replace(found, k_lines=np.empty((0, *found.k_lines.shape[1:]), complex)) for found in identified]
     pairs = [(found, one) for found in without_lines for one in observed]
     h_exact = [exact.h_c[:, at, at] for at in (exact.at(one) for _, one in pairs)]
-    # Nor FRFs of the assembly between all points.
+    # FRFs of the assembly between all points are not needed either.
     uncoupled = replace(exact, h_c=exact.h_c[:0], h_initial=exact.h_initial[:0])
     return list(workers.map(_with_errors, [uncoupled] * len(pairs), h_exact, *zip(*pairs, strict=True)))
 
 
 class PrintedErrors(NamedTuple):
-    """Errors of an FRF regenerated from printed parameters.
+    """Errors of an FRF that is regenerated from published parameters.
 
     Attributes
     ----------
     known : ExpectedErrors
-        Which FRF, band and method, and the published errors.
+        FRF, band, method and published errors.
     amplitude, frequency : float or None
         Errors (4.11) and (4.12), percent; None if the exact or the regenerated FRF has no peak in the band.
     one_line : float
@@ -167,17 +173,18 @@ class PrintedErrors(NamedTuple):
 
 
 def printed_errors(case: KnownJointCase) -> list[PrintedErrors]:
-    """Regenerate the FRFs of published errors from the parameters that the same source prints.
+    """Return errors of FRFs that are regenerated from published parameters.
 
     Parameters
     ----------
     case : KnownJointCase
+        Case with published parameters and errors.
 
     Returns
     -------
     list of PrintedErrors
-        One for each published pair of errors for which all parameters are published; none unless `expected.toml` names
-        lines for it (`printed`).
+        One object for each published pair of errors with a complete set of published parameters; empty without
+        `printed` in `expected.toml`.
     """
     printed, names = case.expected.printed, [parameter.name for parameter in case.parameters]
     parameters = {

@@ -1,4 +1,4 @@
-"""Tables of a case of a known joint: comparisons with a source, and the joints that the methods identify."""
+"""Tables of a case of a known joint: comparisons with a source, and identified joints."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ __all__ = ["build_numbers", "build_summary", "build_tables"]
 
 #: Relative errors without noise, and between ISMM and its short form, that "fit": those of rounding are smaller.
 _NOISE_FREE_LIMIT, _SHORT_FORM_LIMIT = 1e-6, 1e-10
-#: An equation is exact up to this many roundings of the FRFs it takes.
+#: An equation is exact up to this multiple of its change by rounding of the FRFs.
 _ROUNDINGS = 100
 
 
 def build_tables(result: KnownJointResult) -> list[Table]:
-    """Build all tables of a case, the source's own first."""
+    """Return all tables of a case; tables of the source come first."""
     rows = identified_rows(result)
     return [
         *comparisons(result, rows),
@@ -51,7 +51,7 @@ def build_tables(result: KnownJointResult) -> list[Table]:
 
 def _identified(rows: list[Row], count: int) -> Table:
     columns = ("noise", "method", "bands", "parameter", "unit", "actual", *SPREAD, "RMSE, %")
-    # Once, even where the source has it twice.
+    # A row appears once, even if the source lists it twice.
     seen = dict.fromkeys(
         (r.noise, r.method, r.bands, r.parameter, r.parameter.unit, r.actual, r.median, r.low, r.high, r.rmse_percent)
         for r in rows
@@ -61,7 +61,7 @@ def _identified(rows: list[Row], count: int) -> Table:
 
 
 def _bounds(result: KnownJointResult) -> list[Table]:
-    """Table of the decoupling fit beside its bound; none where no case applies it to noise that has one."""
+    """Return the table of the decoupling fit and its bound; an empty list if no noise has a bound."""
     cells: list[tuple[Cell, ...]] = []
     for name, bound in decoupling_bounds(result.case, result.exact).items():
         theta = next(one.theta for one in result.identified if (one.noise, one.method) == (name, "decoupling-fit"))
@@ -82,7 +82,7 @@ def _bounds(result: KnownJointResult) -> list[Table]:
 
 
 def _blocks(result: KnownJointResult, rows: list[Row]) -> list[Table]:
-    """Table of ISMM from both off-diagonal blocks of (2.48); none if ISMM is not applied."""
+    """Return the table of ISMM from both off-diagonal blocks of (2.48); an empty list if ISMM is not applied."""
     published = {(r.noise, r.bands, r.parameter): r.published for r in rows if r.method == "ismm"}
     cells: list[tuple[Cell, ...]] = []
     for found in result.identified:
@@ -104,7 +104,7 @@ def _blocks(result: KnownJointResult, rows: list[Row]) -> list[Table]:
 
 
 def _bands(result: KnownJointResult) -> Table:
-    """Table of the bands of the case next to the bands proposed with either joint."""
+    """Return the table of the bands of the case and of the bands proposed with either joint."""
     sets, observed = result.case.band_sets, result.case.observed
     cells: tuple[tuple[Cell, ...], ...] = tuple(
         (
@@ -155,7 +155,7 @@ def _noise_free(result: KnownJointResult) -> Table:
 
 
 def build_numbers(result: KnownJointResult) -> dict[str, Any]:
-    """Return the numbers of a case for JSON, beside its tables."""
+    """Return the numbers of a case for JSON, without its tables."""
     case = result.case
     return {
         "natural_frequencies_hz": {joint: modes.freq_hz.tolist() for joint, modes in result.modes.items()},
@@ -172,12 +172,12 @@ def build_numbers(result: KnownJointResult) -> dict[str, Any]:
 
 
 def build_summary(result: KnownJointResult, tables: list[Table]) -> list[Table]:
-    """Return short tables: how much fits, and how far the methods are from the actual joint."""
+    """Return short tables with the number of rows that fit and the errors of the methods."""
     return [agreement(tables), *_methods(identified_rows(result))]
 
 
 def _methods(rows: list[Row]) -> list[Table]:
-    """Root-mean-square errors of all methods at noise levels where there are several."""
+    """Return root-mean-square errors of all methods at noise levels with several methods."""
     tables = []
     for count, noise in enumerate(dict.fromkeys(row.noise for row in rows), 1):
         errors: dict[str, dict[Cell, float]] = {}

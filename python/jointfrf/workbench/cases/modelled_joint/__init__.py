@@ -1,8 +1,8 @@
-"""A joint of any laws, from FRFs at any points, given models of the substructures.
+"""A joint with any laws, identified from FRFs at any points with models of the substructures.
 
-keys      the keys of its files, and the case as data
-compute   realisations of the measurement, each fitted, for cases and for studies
-results   parameters beside their bound, residual test; stiffness over frequency, FRFs measured and fitted
+keys      keys of the files, and the case as data
+compute   fits of realisations of the measurement, for cases and for studies
+results   parameters and their bounds, residual test, stiffness over frequency, and measured and fitted FRFs
 """
 
 from jointfrf.kernel.arguments import ComplexArray

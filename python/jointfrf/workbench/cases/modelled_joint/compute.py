@@ -1,4 +1,4 @@
-"""Realisations of the measurement of a modelled joint, each fitted."""
+"""Fits of realisations of the measurement of a modelled joint."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Draw(NamedTuple):
     is_noise : bool
         Whether the residual is noise.
     stiffness : ndarray, shape (n_freq, n)
-        K*(w) of the DOFs that have a law, N/m.
+        Dynamic stiffness K*(w) of the DOFs with a law, N/m.
     """
 
     is_noise: bool
@@ -60,14 +60,15 @@ class ModelledJointResult:
     Attributes
     ----------
     case : ModelledJointCase
+        Case with its keys.
     found : GroupEstimates
-        Parameters of the joint and of the models, with their bounds, and `Draw` objects.
+        Parameters of the joint and of the models with their bounds, and `Draw` objects.
     first : Fit
-        The first realisation.
+        Fit of the first realisation.
     measured : ndarray
-        Its FRFs.
+        FRFs of the first realisation, m/N.
     constant : Fit
-        The same fitted by springs and dashpots in place of laws that depend on frequency.
+        Fit of the first realisation by springs and dashpots in place of frequency-dependent laws.
     """
 
     case: ModelledJointCase
@@ -78,7 +79,7 @@ class ModelledJointResult:
 
 
 def moving_stiffness(joint: Joint | LawJoint, freq_hz: FloatArray) -> ComplexArray:
-    """Return K*(w) of the DOFs that have a law, shape (n_freq, n), N/m."""
+    """Return K*(w) of the DOFs with a law, shape (n_freq, n), N/m."""
     assert isinstance(joint, LawJoint)
     laws = {pair: law for pair, law in joint.laws.items() if pair[0] == pair[1]}
     return np.array([law.stiffness(2 * np.pi * freq_hz) for law in laws.values()]).T
@@ -90,7 +91,7 @@ def exact_frfs(case: ModelledJointCase) -> ComplexArray:
 
 
 def modelled_joint_result(computed: Computed[ModelledJointCase, ComplexArray]) -> ModelledJointResult:
-    """Return the result of a case whose realisations are under way."""
+    """Return the result of a case from its realisations."""
     case, workers = computed.case, computed.workers
     measured = pollute(computed.frfs, case.noise, seed=case.seed)
     first = workers.begin(_fit, case, case.believed, measured)
@@ -100,7 +101,7 @@ def modelled_joint_result(computed: Computed[ModelledJointCase, ComplexArray]) -
 
 
 def _fit_of_exact(case: ModelledJointCase, exact: ComplexArray) -> Fit:
-    """Fit exact FRFs from the actual joint, with the noise known: standard errors are at the Cramer-Rao bound."""
+    """Return the fit of exact FRFs at the actual joint; its standard errors are the Cramer-Rao bound."""
     at_truth = case.believed.with_joint(case.truth.joint)
     return _fit(case, at_truth, exact, np.asarray((case.noise * abs(exact)) ** 2, float))
 
@@ -112,7 +113,7 @@ def _fit(case: ModelledJointCase, whole: Assembly, h: ComplexArray, noise: Float
 
 
 def _constant(joint: LawJoint) -> LawJoint:
-    """Return springs and dashpots in place of laws that depend on frequency."""
+    """Return a joint with springs and dashpots in place of frequency-dependent laws."""
     laws: dict[tuple[str, str], JointLaw] = {
         pair: law if law.constant_terms is not None else SpringLaw(float(abs(law.values[0])), c=1.0)
         for pair, law in joint.laws.items()
@@ -126,18 +127,18 @@ ESTIMATOR = "model-fit"
 
 @dataclass(frozen=True)
 class ModelFitSource:
-    """Realisations of the measurement, each fitted with the models."""
+    """Estimates from realisations of the measurement by fits with the models."""
 
     case: ModelledJointCase
     exact: ComplexArray
     names: tuple[str, ...]
 
     def __call__(self, first: int, count: int) -> Estimates:
-        """Fit each realisation; the row of one that cannot be fitted is NaN."""
+        """Return the fit of each realisation; NaN in the row of a realisation that cannot be fitted."""
         return self._fits(first, count, (ValueError, ArithmeticError))[0]
 
     def details(self, first: int, count: int) -> tuple[Estimates, list[Draw]]:
-        """Fit each realisation; raise ValueError if one cannot be fitted."""
+        """Return the fit of each realisation; raise ValueError if one cannot be fitted."""
         return self._fits(first, count, ())
 
     def _fits(self, first: int, count: int, failures: tuple[type[Exception], ...]) -> tuple[Estimates, list[Draw]]:
@@ -155,7 +156,7 @@ class ModelFitSource:
 
 
 def estimate_groups(case: ModelledJointCase, exact: ComplexArray, choice: StudyChoice | None) -> list[EstimateGroup]:
-    """Return the fit with models."""
+    """Return the group of the fit with models."""
     if choice is not None and choice.noises:
         raise ValueError(f"unknown noise {choice.noises[0]!r} in a case of kind modelled-joint; set [measured] noise")
     fit = _fit_of_exact(case, exact)

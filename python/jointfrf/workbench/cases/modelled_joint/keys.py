@@ -1,4 +1,4 @@
-"""A case of a modelled joint: the keys of its files, and the case that they give."""
+"""Keys of the files of a case of a modelled joint, and the case itself."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class LawKeys(Keys):
     ] = field(default_factory=dict)  # fmt: skip
     start: Annotated[
         dict[str, float],
-        key("The same, where the fit starts.", absent="required but for `rigid`", example={"k": 2e4, "c": 1.0}),
+        key("Initial values of these parameters.", absent="required but for `rigid`", example={"k": 2e4, "c": 1.0}),
     ] = field(default_factory=dict)
     mass: Annotated[
         NotNegative | None,
@@ -58,7 +58,7 @@ class LawKeys(Keys):
 
 
 class MeasuredKeys(Keys):
-    """What is measured: receptances between these DOFs, named `A/...` and `B/...`, with complex noise of each entry."""
+    """Measured receptances between these DOFs, named `A/...` and `B/...`, with complex noise of each entry."""
 
     responses: Annotated[
         tuple[str, ...],
@@ -69,22 +69,22 @@ class MeasuredKeys(Keys):
 
 
 class UnknownKeys(Keys):
-    """A number of a model that is not exactly known: it is fitted with the joint, under a normal prior."""
+    """A number of a model that is not exactly known; it is fitted with the joint under a normal prior."""
 
-    substructure: Annotated[Literal["A", "B"], key("Whose.")]
-    name: Annotated[Literal["youngs_modulus", "density", "loss_factor"], key("Which number.")]
-    value: Annotated[NotNegative, key("What is believed.", "N/m^2, kg/m^3")]
-    std_percent: Annotated[NotNegative, key("Standard deviation of that belief.", "%")]
-    error_percent: Annotated[float, key("By how much the actual value differs.", "%")]
+    substructure: Annotated[Literal["A", "B"], key("Substructure of the number.")]
+    name: Annotated[Literal["youngs_modulus", "density", "loss_factor"], key("Name of the number.")]
+    value: Annotated[NotNegative, key("Prior mean.", "N/m^2, kg/m^3")]
+    std_percent: Annotated[NotNegative, key("Standard deviation of the prior.", "%")]
+    error_percent: Annotated[float, key("Difference between the actual value and `value`.", "%")]
 
 
 class AddedMassKeys(Keys):
-    """A mass of a sensor or shaker that the models do not have."""
+    """A mass of a sensor or shaker that the models do not contain."""
 
-    dof: Annotated[str, key("Where, `A/...` or `B/...`.")]
+    dof: Annotated[str, key("DOF of the mass, `A/...` or `B/...`.")]
     mass: Annotated[NotNegative, key("Actual mass.", "kg")]
-    believed: Annotated[NotNegative, key("What is believed.", "kg")]
-    std: Annotated[NotNegative, key("Standard deviation of that belief.", "kg")]
+    believed: Annotated[NotNegative, key("Prior mean.", "kg")]
+    std: Annotated[NotNegative, key("Standard deviation of the prior.", "kg")]
 
 
 class ModelledJointKeys(CaseKeys, tag="modelled-joint"):
@@ -105,8 +105,8 @@ class ModelledJointKeys(CaseKeys, tag="modelled-joint"):
         key("The joint.", example=[{"dof": "y"}, {"dof": "theta", "actual": {"k": 60.0, "c": 0.005},
                                                  "start": {"k": 20.0, "c": 0.001}}]),
     ]  # fmt: skip
-    measured: Annotated[MeasuredKeys, key("What is measured.")]
-    unknown: Annotated[tuple[UnknownKeys, ...], key("What is not known of the models.", absent="nothing")] = ()
+    measured: Annotated[MeasuredKeys, key("Measured receptances.")]
+    unknown: Annotated[tuple[UnknownKeys, ...], key("Uncertain numbers of the models.", absent="nothing")] = ()
     added_mass: Annotated[tuple[AddedMassKeys, ...], key("Masses of sensors and shakers.")] = ()
     show_hz: Annotated[
         tuple[float, ...],
@@ -116,20 +116,22 @@ class ModelledJointKeys(CaseKeys, tag="modelled-joint"):
 
 @dataclass(frozen=True, kw_only=True)
 class ModelledJointCase(Case):
-    """A case of a modelled joint.
+    """Case of a modelled joint.
 
     Attributes
     ----------
     truth : Assembly
-        With the actual values, nothing unknown.
+        Assembly with the actual values and no unknown numbers.
     believed : Assembly
-        What is fitted: the start of the joint, unknowns with their priors.
+        Assembly of the fit, with the initial values of the joint and the priors of unknown numbers.
     actual : mapping of str to float
-        Actual values of all parameters that are fitted.
+        Actual values of all fitted parameters.
     responses, forces : tuple of str
+        Measured DOFs, and DOFs of the forces.
     noise : float
+        Level of the noise, 0.02 for 2 %.
     show_hz : ndarray
-        Hz.
+        Frequencies of the table of stiffness and loss factor, Hz.
     """
 
     truth: Assembly
@@ -142,7 +144,7 @@ class ModelledJointCase(Case):
 
 
 def read_modelled_joint(common: Case, keys: ModelledJointKeys, expected: ExpectedKeys) -> ModelledJointCase:
-    """Return the case that its files give; raises FileContentError."""
+    """Return the case of its files; raise FileContentError if they are invalid."""
     models = [one.structure(common.freq_hz) for one in (keys.substructure_a, keys.substructure_b)]
     actual, start = _joints(keys)
     unknowns: dict[str, dict[str, Unknown]] = {"A": {}, "B": {}}
@@ -159,7 +161,7 @@ def read_modelled_joint(common: Case, keys: ModelledJointKeys, expected: Expecte
     sides = []
     for name, structure, dofs in zip("AB", models, (keys.points.j, keys.points.k), strict=True):
         assert isinstance(structure, ModelStructure)
-        # All that is wrong with the models is stated in the file.
+        # The models have no errors except the unknown numbers in the file.
         sides.append((Substructure(_changed(structure, factors[name]), dofs, exact=True),
                       Substructure(structure.model, dofs, unknowns[name], exact=True)))  # fmt: skip
     truth = keys.build(lambda: Assembly(sides[0][0], sides[1][0], actual, actual_masses))
@@ -179,7 +181,7 @@ def read_modelled_joint(common: Case, keys: ModelledJointKeys, expected: Expecte
 
 
 def _changed(structure: ModelStructure, factors: dict[str, float]) -> Model:
-    """Return the model with actual values: by a substructure whose unknowns are scaled."""
+    """Return the model with actual values, from a substructure with scaled unknowns."""
     units = {word: Unknown(1.0) for word in factors if word != "loss_factor"}
     if "loss_factor" in factors:
         units["loss_factor"] = Unknown(structure.model.loss_factor)
@@ -188,7 +190,7 @@ def _changed(structure: ModelStructure, factors: dict[str, float]) -> Model:
 
 
 def _joints(keys: ModelledJointKeys) -> tuple[LawJoint, LawJoint]:
-    """Return the actual joint and the start of the fit."""
+    """Return the actual joint and the joint with the initial values of the fit."""
     laws: dict[str, dict[str, JointLaw]] = {"actual": {}, "start": {}}
     for own in keys.law:
         if own.law == "rigid":

@@ -18,7 +18,7 @@ from jointfrf.workbench.report.table import Cell, Table, number
 
 __all__ = ["build_figures", "build_numbers", "build_summary", "build_tables"]
 
-#: Chance of a coverage as low as that of a row whose verdict is "does not fit".
+#: Least probability of the coverage of a row that fits.
 _CHANCE = 0.005
 
 
@@ -28,7 +28,7 @@ def build_tables(result: ModelledJointResult) -> list[Table]:
 
 
 def _parameters(result: ModelledJointResult) -> Table:
-    """Parameters beside their bound, and how often intervals hold them."""
+    """Return the table of parameters, their bounds, and the coverage of their intervals."""
     from scipy.stats import binom
 
     rows = []
@@ -54,7 +54,7 @@ def _parameters(result: ModelledJointResult) -> Table:
 
 
 def _stiffness(result: ModelledJointResult) -> Table:
-    """Stiffness and loss factor of each law at some frequencies."""
+    """Return the table of stiffness and loss factor of each law at some frequencies."""
     case = result.case
     exact = moving_stiffness(case.truth.joint, case.show_hz)
     constant = moving_stiffness(result.constant.joint, case.show_hz)
@@ -79,7 +79,7 @@ def _stiffness(result: ModelledJointResult) -> Table:
 
 
 def _residuals(result: ModelledJointResult) -> Table:
-    """Whether the residual is noise: of the laws of the case, and of springs and dashpots."""
+    """Return the table of residual tests with the laws of the case, and with springs and dashpots."""
     first, constant = result.first.test, result.constant.test
     assert isinstance(first, ResidualTest)
     assert isinstance(constant, ResidualTest)
@@ -107,7 +107,7 @@ def _where(bands: tuple[tuple[float, float, float], ...]) -> str:
 
 
 def build_summary(result: ModelledJointResult, tables: list[Table]) -> list[Table]:
-    """Return what came out, in short."""
+    """Return short tables of the outcome."""
     worst = max(
         (float(row[6]) / float(row[7]), str(row[0]))  # type: ignore[arg-type]
         for row in tables[0].rows
@@ -123,7 +123,7 @@ def build_summary(result: ModelledJointResult, tables: list[Table]) -> list[Tabl
 
 
 def build_numbers(result: ModelledJointResult) -> dict[str, Any]:
-    """Return what `results.json` holds beside tables: the first realisation, and all values."""
+    """Return the numbers of a case for JSON: the first realisation, and all estimates."""
     values = result.found.estimates.values.T.tolist()
     return {
         "first": fit_to_dict(result.first, lines=False),
@@ -132,7 +132,7 @@ def build_numbers(result: ModelledJointResult) -> dict[str, Any]:
 
 
 def build_figures(result: ModelledJointResult) -> list[Figure]:
-    """Return stiffness and loss factor over frequency, and the FRFs of the first realisation."""
+    """Return figures of stiffness and loss factor over frequency, and of the FRFs of the first realisation."""
     return [_stiffness_figure(result), _frf_figure(result)]
 
 
