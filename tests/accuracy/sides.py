@@ -20,13 +20,14 @@ import tempfile
 import time
 import warnings
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 from bodies import Body, Pair, pair
 
 import jointfrf as jf
 from jointfrf.dofs import DIRECTIONS
-from jointfrf.identification import identify as door
+from jointfrf.identification import identify
 
 #: The first member that gave no quantiles.
 FRESH = 105
@@ -142,13 +143,13 @@ def main() -> None:
     path = Path(tempfile.gettempdir()) / "sides.jsonl"
     done = {one["index"]: one for one in map(json.loads, path.read_text().splitlines())} if path.exists() else {}
     warnings.simplefilter("ignore")
-    door._look_at = lambda *_: []  # what is wrong with channels is not studied here
-    # Members that gave quantiles and others in turn.
-    for index in sorted(range(first, last), key=lambda index: (index % FRESH, index)):
-        if index not in done and (one := member(index)) is not None:
-            done[index] = one
-            with path.open("a") as file:
-                file.write(json.dumps(one) + "\n")
+    # Members that gave quantiles and others in turn; errors of channels are not studied here.
+    with mock.patch.object(identify, "_data_checks", return_value=[]):
+        for index in sorted(range(first, last), key=lambda index: (index % FRESH, index)):
+            if index not in done and (one := member(index)) is not None:
+                done[index] = one
+                with path.open("a") as file:
+                    file.write(json.dumps(one) + "\n")
     tables([done[index] for index in sorted(done) if first <= index < last])
 
 
