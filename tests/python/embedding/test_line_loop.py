@@ -29,15 +29,21 @@ def test_one_line_at_a_time(installed_library: InstalledLibrary, tmp_path):
     np.testing.assert_allclose(rows[:, 1] + 1j * rows[:, 2], expected, rtol=1e-12)
 
 
-def test_the_loop_and_a_sweep_agree(installed_library: InstalledLibrary, tmp_path):
-    """The program takes the reference engine, whatever is chosen; kernels of OpenBLAS round by place in memory."""
-    program = installed_library.compile(SOURCE, tmp_path / "loop")
-    text = run([program], env={"JOINTFRF_ENGINE": "lapack"})
-    assert text == run([program], env={"JOINTFRF_ENGINE": "plain"})
-    rows = np.array([line.split() for line in text.splitlines()], float)
+def test_the_loop_and_a_sweep_have_the_same_bits(installed_library: InstalledLibrary, tmp_path):
+    """In the layout of Python, 'T', by the reference engine. The layout 'N' makes other calls of LAPACK."""
+    transposed = tmp_path / "transposed.f"
+    transposed.write_text(SOURCE.read_text().replace("_WORK('N'", "_WORK('T'"))
+    texts = {}
+    for name, source in (("N", SOURCE), ("T", transposed)):
+        program = installed_library.compile(source, tmp_path / name)
+        texts[name] = run([program], env={"JOINTFRF_ENGINE": "lapack"})
+        assert texts[name] == run([program], env={"JOINTFRF_ENGINE": "plain"})
+    found = {name: np.array([line.split() for line in text.splitlines()], float) for name, text in texts.items()}
+    freq_hz = found["T"][:, 0]
     k, m = np.array([[2000.0, -1000.0], [-1000.0, 1000.0]]), 2.0 * np.eye(2)
     joint = jf.Joint([500.0], [3.0])
     with jf.use_engine("lapack"):
-        h = jf.Model(k, m, ("1:x", "2:x"), loss_factor=0.01).receptance(rows[:, 0], method="dense")
-        gamma = jf.couple(h, h, joint.dynamic_stiffness(rows[:, 0]), [1], [1])
-    np.testing.assert_allclose(gamma[:, 1, 1], rows[:, 1] + 1j * rows[:, 2], rtol=1e-13)
+        h = jf.Model(k, m, ("1:x", "2:x"), loss_factor=0.01).receptance(freq_hz, method="dense")
+        gamma = jf.couple(h, h, joint.dynamic_stiffness(freq_hz), [1], [1])[:, 1, 1]
+    np.testing.assert_array_equal(gamma, found["T"][:, 1] + 1j * found["T"][:, 2])
+    np.testing.assert_allclose(gamma, found["N"][:, 1] + 1j * found["N"][:, 2], rtol=1e-13)
