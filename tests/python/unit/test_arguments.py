@@ -83,3 +83,9 @@ def test_a_required_option_and_a_file_that_cannot_be_written_are_errors(parser, 
         arguments(parser, "a.txt")
     with pytest.raises(UsageError, match="--save: folder none does not exist"):
         arguments(parser, "a.txt", "--band", "1:2", "--save", "none/a.json").check_files()
+
+
+def test_a_word_that_is_no_number_is_an_error_with_a_remedy(parser, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        parser.parse_words(["a.txt", "--tolerance", "5%"])
+    assert "argument --tolerance: '5%' is not a number; use a number such as 0.05" in capsys.readouterr().err

@@ -66,6 +66,23 @@ def number(holds: Callable[[float], bool], fault: str) -> Callable[[str], float]
     return parse
 
 
+def _number_of(kind: type, fault: str) -> Callable[[str], Any]:
+    def parse(word: str) -> Any:
+        try:
+            return kind(word)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{word!r} {fault}") from None
+
+    return parse
+
+
+#: Parsers of numbers without a condition: the library checks the value.
+_NUMBERS: dict[type, Callable[[str], Any]] = {
+    float: _number_of(float, "is not a number; use a number such as 0.05"),
+    int: _number_of(int, "is not a whole number; use a number such as 3"),
+}
+
+
 def option(text: str, metavar: str = "", default: Any = None, *, otherwise: str = "", keyword: str = "") -> Any:
     """Declare a field as an option, whose name is the name of the field.
 
@@ -240,7 +257,7 @@ def _declared(one: Any, hint: Any, group: type[Arguments], heading: str) -> Decl
     inner = _without_none(hint)
     is_list = get_origin(inner) is list
     inner = _without_none(get_args(inner)[0]) if is_list else inner
-    form = Form("FILE" if inner is Path else "", inner)
+    form = Form("FILE" if inner is Path else "", _NUMBERS.get(inner, inner))
     if get_origin(inner) is Literal:
         form = Form("", one_of(get_args(inner)), choices=get_args(inner))
     elif get_origin(inner) is Annotated:
