@@ -15,7 +15,7 @@ module jointfrf_estimate_noise
   !> Parts of the noise by entry and its variation over frequency are found in turn so often at most.
   integer, parameter :: level_turns = 10
   !> Fewer lines hardly show what a floor is constant in.
-  integer, parameter :: fewest_lines = 100
+  integer, parameter :: fewest_lines = 25
   !> A floor is taken to be constant in acceleration, as accelerometers have it, if it raises the likelihood by odds of
   !> 20 to 1, unless a constant one lowers -2 log likelihood by a share of the number of squares. Smooth FRFs hide a
   !> floor of acceleration, of few lines, more than they hide a constant one.

@@ -18,7 +18,7 @@ from jointfrf.frf.noise_parts import (
     ReciprocityDifferences,
     line_correlation,
     line_levels,
-    noise_parts,
+    parts_with_floor,
     reciprocity_differences,
 )
 from jointfrf.frf.quantiles import medians
@@ -277,7 +277,7 @@ def calibration_errors(
         differences = _of_directions(h, *known)
     elif n_slow:
         again = setups if setups is None else setups.on_lines(lines)
-        differences = _differences(h, again, reciprocal=reciprocal)
+        differences = _differences(freq, h, again, reciprocal=reciprocal)
     if differences is None:
         return _stated_errors(span, setups)
     said = None if setups is None else setups.gain
@@ -426,12 +426,12 @@ def _of_channels(rows: NDArray[np.intp], columns: NDArray[np.intp], n_ways: int)
     return found
 
 
-def _differences(h: ComplexArray, setups: SetUps | None, *, reciprocal: bool) -> _Differences | None:
+def _differences(freq: FloatArray, h: ComplexArray, setups: SetUps | None, *, reciprocal: bool) -> _Differences | None:
     """Return the differences of FRFs that were measured twice; None if there are none."""
     both = reciprocity_differences(h, entry_groups(h, reciprocal=True)) if reciprocal else None
     if setups is None:
         near = near_squares(h)
-        return None if both is None else _of_directions(h, both, both.variance_of_parts(near, medians(near.T).T))
+        return None if both is None else _of_directions(h, both, both.variance_of_parts(near, medians(near.T).T, freq))
     empty = np.zeros(0, np.intp)
     rows, columns = (empty, empty) if both is None else (both.rows, both.columns)
     one, other, n_ways = h[:, rows, columns], h[:, columns, rows], len(rows)
@@ -446,9 +446,9 @@ def _differences(h: ComplexArray, setups: SetUps | None, *, reciprocal: bool) ->
         return None
     values, near = np.ascontiguousarray((one - other).T), near_squares(np.stack([one, other], axis=1))
     both_near = near.sum(axis=1).T
-    flat = np.broadcast_to(medians(near.T).sum(axis=1)[:, None], both_near.shape)
-    relative, floor = noise_parts(np.square(abs(values)), np.stack([both_near, flat]), robust=True)
-    noise = np.maximum(relative[:, None] * both_near + floor[:, None] * flat, TINY)
+    usual = medians(near.T).sum(axis=1)
+    relative, floor, shape = parts_with_floor(np.square(abs(values)), both_near, usual, freq)
+    noise = np.maximum(relative[:, None] * both_near + (floor * usual)[:, None] * shape, TINY)
     number = np.arange(len(rows))
     of_setups = np.zeros((len(rows), len(setups.names)))
     np.add.at(of_setups, (number, first), 1)

@@ -130,7 +130,7 @@ def found_cross_axis(
         (q == i)[:, None] * of_dofs[:, p, d].T - (p == i)[:, None] * of_dofs[:, q, d].T
         for i, d in zip(channels, dofs, strict=True)
     ]
-    found = _estimated(h, differences, np.stack([*own, *nuisance], axis=-1), len(own))
+    found = _estimated(freq, h, differences, np.stack([*own, *nuisance], axis=-1), len(own))
     if found is None:
         return None
     share, error = found
@@ -157,14 +157,14 @@ def _shares(modes: FloatArray, size: FloatArray, n: int) -> tuple[NDArray[np.int
 
 
 def _estimated(
-    h: ComplexArray, differences: ReciprocityDifferences, design: ComplexArray, k: int
+    freq: FloatArray, h: ComplexArray, differences: ReciprocityDifferences, design: ComplexArray, k: int
 ) -> tuple[FloatArray, FloatArray] | None:
     """Return the first k unknowns and their standard errors, if they are more than chance."""
     near, values, found = near_squares(h), differences.values, np.zeros(design.shape[-1])
     equations, usual = real_equations(design, values), medians(near.T).T
     for _ in range(_TURNS):
         left = replace(differences, values=values - design @ found)
-        fit = huber_fit(*equations, 1 / np.sqrt(left.pair_variance(left.variance_of_parts(near, usual))))
+        fit = huber_fit(*equations, 1 / np.sqrt(left.pair_variance(left.variance_of_parts(near, usual, freq))))
         found = fit.solution / fit.size
     solution, size, _, inverse, residual = fit
     inflation = line_correlation(residual.view(np.complex128).reshape(values.shape))

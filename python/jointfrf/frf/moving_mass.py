@@ -141,7 +141,7 @@ def _fitted(
     equations, usual = real_equations(design, values), medians(near.T).T
     for _ in range(_TURNS):
         left = replace(differences, values=values - mass * pattern)
-        fit = huber_fit(*equations, 1 / np.sqrt(left.pair_variance(left.variance_of_parts(near, usual))))
+        fit = huber_fit(*equations, 1 / np.sqrt(left.pair_variance(left.variance_of_parts(near, usual, freq))))
         mass = float(fit.solution[0] / fit.size[0])
     steps = steps_without_a_line(fit, freq.size)
     error = float(np.sqrt(np.square(steps[:, 0]).sum()) / fit.size[0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, cast
+from typing import Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,7 @@ from jointfrf.frf.calibration import CalibrationErrors, calibration_errors
 from jointfrf.frf.entry_groups import EntryGroup, entry_groups, reciprocity_noise
 from jointfrf.frf.noise_parts import (
     ReciprocityDifferences,
+    acceleration_floor,
     line_correlation,
     reciprocity_differences,
 )
@@ -32,7 +33,7 @@ from jointfrf.frf.smoothing import (
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray, as_integer, as_number, as_real, check_type
 from jointfrf.kernel.call import call_for_number
 
-__all__ = ["NoiseModel", "acceleration_floor", "describes_better", "estimate_noise", "found_noise"]
+__all__ = ["NoiseModel", "estimate_noise", "found_noise"]
 
 #: Source of the variance.
 NoiseSource = Literal["residual", "reciprocity", "none"]
@@ -48,10 +49,6 @@ _UNSEEN = 3.0
 _MISSED = 2.0
 #: Number of lines below which the noise by entry is hardly known, and smooth FRFs are no better than measured ones.
 _COARSE = 50
-#: Difference of -2 log likelihood: odds of 20 to 1.
-_CLEARLY = 6.0
-#: Share of the median line below which a floor of acceleration is constant, because sensors end there.
-_LOWEST = 1e-3
 #: Relative size of differences that are smooth over frequency above which FRFs are not reciprocal.
 _UNSYMMETRIC = 0.5
 #: Least relative noise for weights: systematic errors of measured FRFs are larger.
@@ -301,13 +298,6 @@ def found_noise(
     return replace(_joined(places, parts(), lines.shape), calibration=calibration)
 
 
-def acceleration_floor(freq_hz: FloatArray) -> FloatArray:
-    """Return the variance of receptances by noise that is constant in acceleration, 1 at the median line."""
-    middle = float(medians(freq_hz))
-    lowest = max(_LOWEST * middle, float(np.min(freq_hz, where=freq_hz > 0, initial=np.inf)))
-    return np.asarray((middle / np.maximum(freq_hz, lowest)) ** 4) if middle > 0 else np.ones(freq_hz.size)
-
-
 def _joined(places: list[NDArray[np.intp]], parts: Iterable[NoiseModel], shape: tuple[int, ...]) -> NoiseModel:
     """Return the noise of FRFs of this shape, pieces of the lines at their places; parts and inflation are means."""
     n_freq = shape[0]
@@ -378,7 +368,7 @@ class _NoisyLines:
     def variance_of_differences(self) -> FloatArray:
         """Variance of all entries by the parts of the differences."""
         assert self.differences is not None
-        return self.differences.variance_of_parts(self.near, self.usual)
+        return self.differences.variance_of_parts(self.near, self.usual, self.freq)
 
     def smoothed(
         self, variance: FloatArray, inflation: float | None, patience: int, start: tuple[ComplexArray, ...] = ()
@@ -395,6 +385,23 @@ class _NoisyLines:
     @cached_property
     def _least(self) -> FloatArray:
         return np.maximum(_ROUNDING**2 * first_variance(self.near, self.usual), TINY)
+
+
+class _NoiseParts(NamedTuple):
+    """Relative noise and floor of all entries, shape (n_out, n_in), and the dependence of floor^2 on frequency."""
+
+    relative: FloatArray
+    floor: FloatArray
+    shape: FloatArray
+
+    @property
+    def of_acceleration(self) -> bool:
+        """Whether the floor depends on frequency."""
+        return bool((self.shape != 1).any())
+
+    def variance(self, squares: FloatArray) -> FloatArray:
+        """Return the variance of FRFs with these squares |h|^2, shape (n_freq, n_out, n_in)."""
+        return np.asarray(self.relative**2 * squares + self.floor**2 * self.shape[:, None, None])
 
 
 def _estimated(
@@ -414,9 +421,9 @@ def _estimated(
     else:
         model = _model(lines.h, smooth, given, inflation or 1.0, differences, robust=False)
     smooth = model.smooth
-    level = None if differences is None else _level_of_differences(lines, model, differences)
-    if level is not None:
-        return _without_smoothing(lines, replace(smooth, h=lines.h, is_smooth=False), differences, level)
+    seen = None if differences is None else _noise_of_differences(lines, model, differences)
+    if seen is not None:
+        return _without_smoothing(lines, replace(smooth, h=lines.h, is_smooth=False), differences, seen)
     inflation, source = _found_inflation(lines.h, differences, model)
     return replace(model, inflation=inflation, inflation_source=source)
 
@@ -448,11 +455,13 @@ def _converged(
     return _model(lines.h, smooth, given, inflation or 1.0, differences, robust=False)
 
 
-def _level_of_differences(lines: _NoisyLines, model: NoiseModel, differences: ReciprocityDifferences) -> float | None:
-    """Return the relative noise that differences show, if it describes the noise better than measured minus smooth.
+def _noise_of_differences(
+    lines: _NoisyLines, model: NoiseModel, differences: ReciprocityDifferences
+) -> _NoiseParts | None:
+    """Return the noise that differences show, if it describes the noise better than measured minus smooth.
 
-    It does for few and coarse lines, which rational functions miss by as much as their noise or more: if the residual
-    is far more than the differences, and the noise has one relative level. For many lines, noise that h_pq and h_qp
+    It does for few and coarse lines, which rational functions miss by as much as their noise or more: if the noise has
+    one relative level, or if the residual is far more than the differences. For many lines, noise that h_pq and h_qp
     share is more likely. Differences of rounding show no noise.
     """
     if len(lines.h) >= _COARSE:
@@ -460,10 +469,23 @@ def _level_of_differences(lines: _NoisyLines, model: NoiseModel, differences: Re
     ratio = differences.ratio(model.variance)
     if ratio * model.level < _ROUNDING:
         return None
-    if ratio < 1 / _MISSED:
-        return float(reciprocity_noise(lines.h[None])[0])
-    level = differences.common_level(lines.h, model.smooth.h)
-    return level if level > 0 else None
+    level = differences.common_level(lines.freq, lines.h, model.smooth.h)
+    if level > 0:
+        return _relative_noise(lines, level)
+    if ratio >= 1 / _MISSED:
+        return None
+    squares = np.square(abs(lines.h))
+    usual = medians(squares.T).T
+    (relative, floor), shape = differences.parts(squares, usual, lines.freq)
+    return _NoiseParts(np.sqrt(relative), np.sqrt(floor * usual), shape)
+
+
+def _relative_noise(lines: _NoisyLines, level: float) -> _NoiseParts:
+    """Return noise of one relative level in all entries that are not zero."""
+    relative = np.zeros((1, *lines.h.shape[1:]))
+    for group in lines.groups:
+        group.put(np.full((len(group.rows), 1), level), relative)
+    return _NoiseParts(relative[0], np.zeros_like(relative[0]), np.ones(len(lines.h)))
 
 
 def _initial(
@@ -586,31 +608,27 @@ def _numbers(shown: NDArray[np.bool_], differences: ReciprocityDifferences | Non
     return np.ascontiguousarray(both[:, both.all(axis=0)])
 
 
-def describes_better(loss: float, other: float) -> bool:
-    """Return whether -2 log likelihood of another floor is clearly lower."""
-    return loss < other - _CLEARLY
-
-
 def _without_smoothing(
-    lines: _NoisyLines, smooth: SmoothFrfs, differences: ReciprocityDifferences | None, level: float = 0.0
+    lines: _NoisyLines,
+    smooth: SmoothFrfs,
+    differences: ReciprocityDifferences | None,
+    parts: _NoiseParts | None = None,
 ) -> NoiseModel:
-    """Return relative noise equal for all entries, for few lines and for nearly exact FRFs."""
+    """Return the noise model for few lines and for nearly exact FRFs; by default one relative level."""
     h = lines.h
     n_freq, n_out, n_in = h.shape
-    source = "reciprocity" if level > 0 else "none"
-    if level == 0 and lines.reciprocal and n_out == n_in:
-        level, source = float(reciprocity_noise(h[None])[0]), "reciprocity"
-    if level == 0:
-        level, source = (smooth.level, "residual") if smooth.poles else (0.0, "none")
-    relative = np.zeros((1, n_out, n_in))
-    for group in lines.groups:
-        group.put(np.full((len(group.rows), 1), level), relative)
-    variance, factor = relative**2 * abs(h) ** 2, np.ones(n_freq)
+    source = "reciprocity"
+    if parts is None:
+        level = float(reciprocity_noise(h[None])[0]) if lines.reciprocal and n_out == n_in else 0.0
+        if level == 0:
+            level, source = (smooth.level, "residual") if smooth.poles else (0.0, "none")
+        parts = _relative_noise(lines, level)
+    variance, factor = parts.variance(np.square(abs(h))), np.ones(n_freq)
     if differences is not None and smooth.poles:  # enough lines to find outlying ones
         factor = differences.line_levels(lines.weighing(variance)).factor
     return NoiseModel(
-        relative=relative[0],
-        floor=np.zeros((n_out, n_in)),
+        relative=parts.relative,
+        floor=parts.floor,
         coherence_factor=np.zeros((n_out, n_in)),
         variance=variance * factor[:, None, None],
         inflation=1.0,
@@ -619,4 +637,5 @@ def _without_smoothing(
         line_factor=factor,
         source=cast(NoiseSource, source),
         smooth=smooth,
+        floor_of_acceleration=parts.of_acceleration,
     )

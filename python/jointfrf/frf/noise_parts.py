@@ -14,13 +14,20 @@ from jointfrf.kernel.call import call, call_for_number
 
 __all__ = [
     "ReciprocityDifferences",
+    "acceleration_floor",
+    "describes_better",
     "is_smooth",
     "line_correlation",
     "line_levels",
     "noise_parts",
+    "parts_with_floor",
     "reciprocity_differences",
 ]
 
+#: Difference of -2 log likelihood: odds of 20 to 1.
+_CLEARLY = 6.0
+#: Share of the median line below which a floor of acceleration is constant, because sensors end there.
+_LOWEST = 1e-3
 #: Number of standard deviations beyond which both directions of a pair have different noise.
 _APART = 4.0
 
@@ -55,6 +62,57 @@ def noise_parts(squares: FloatArray, terms: FloatArray, *, robust: bool = False,
     squares, terms = np.ascontiguousarray(squares), np.ascontiguousarray(terms)
     call("noise_parts", (method, *terms.shape, squares, terms, parts))
     return parts
+
+
+def acceleration_floor(freq_hz: FloatArray) -> FloatArray:
+    """Return the variance of receptances by noise that is constant in acceleration, 1 at the median line."""
+    middle = float(medians(freq_hz))
+    lowest = max(_LOWEST * middle, float(np.min(freq_hz, where=freq_hz > 0, initial=np.inf)))
+    return np.asarray((middle / np.maximum(freq_hz, lowest)) ** 4) if middle > 0 else np.ones(freq_hz.size)
+
+
+def describes_better(loss: float, other: float) -> bool:
+    """Return whether -2 log likelihood of another floor is clearly lower."""
+    return loss < other - _CLEARLY
+
+
+def parts_with_floor(
+    squares: FloatArray, near: FloatArray, usual: FloatArray, freq_hz: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return a relative part and a floor of the variance by entry, robustly, and the shape of the floor.
+
+    Parameters
+    ----------
+    squares : ndarray, shape (n_entries, n_freq)
+        Squares |e|^2.
+    near : ndarray, shape (n_entries, n_freq)
+        |h|^2 over neighbouring lines.
+    usual : ndarray, shape (n_entries,)
+        Unit of the floor.
+    freq_hz : ndarray, shape (n_freq,)
+        Frequencies, Hz.
+
+    Returns
+    -------
+    relative, floor : ndarray, shape (n_entries,)
+        E|e|^2 = relative near + floor usual shape.
+    shape : ndarray, shape (n_freq,)
+        Constant in receptance or in accelerance, whichever describes the squares better.
+
+    Notes
+    -----
+    The ratio of two exponentially distributed squares replaces the exponential distribution in the likelihood: a few
+    lines with another error than noise then do not decide.
+    """
+    found = []
+    for shape in (np.ones(freq_hz.size), acceleration_floor(freq_hz)):
+        unit = np.broadcast_to(usual[:, None], squares.shape)
+        relative, floor = noise_parts(squares / shape, np.stack([near / shape, unit]), robust=True)
+        median = np.maximum((relative[:, None] * near + floor[:, None] * unit * shape) * np.log(2), TINY)
+        loss = 2 * float((np.log(median) + 2 * np.log1p(squares / median)).sum())
+        found.append((loss, relative, floor, shape))
+    constant, accelerated = found
+    return (accelerated if describes_better(accelerated[0], constant[0]) else constant)[1:]
 
 
 @dataclass(frozen=True)
@@ -141,34 +199,42 @@ class ReciprocityDifferences:
         total: FloatArray = (variance[:, self.rows, self.columns] + variance[:, self.columns, self.rows]).T
         return np.maximum(total, TINY)
 
-    def variance_of_parts(self, near: FloatArray, size: FloatArray) -> FloatArray:
-        """Return the variance of all entries from relative and floor parts of the differences.
+    def parts(self, near: FloatArray, size: FloatArray, freq_hz: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return relative and floor parts of all entries by the differences.
 
         Parameters
         ----------
         near : ndarray, shape (n_freq, m, m)
-            Squares |h|^2 over neighbouring lines.
+            Squares |h|^2, or their means over neighbouring lines.
         size : ndarray, shape (m, m)
             Medians of `near`.
+        freq_hz : ndarray, shape (n_freq,)
+            Frequencies, Hz.
 
         Returns
         -------
-        ndarray, shape (n_freq, m, m)
-            Variance. Both entries of a pair have the same parts; an entry that is in no pair has the means of entries
-            in its row and column, floors relative to the median of |h|^2.
+        parts : ndarray, shape (2, m, m)
+            Relative part, and floor relative to `size`. Both entries of a pair have the same parts; an entry that is in
+            no pair has the means of entries in its row and column.
+        shape : ndarray, shape (n_freq,)
+            Dependence of the floor on frequency.
         """
         pair_size = size[self.rows, self.columns] + size[self.columns, self.rows]
         both: FloatArray = (near[:, self.rows, self.columns] + near[:, self.columns, self.rows]).T
-        flat = np.broadcast_to(pair_size[:, None], both.shape)
-        parts = noise_parts(np.square(abs(self.values)), np.stack([both, flat]), robust=True)
+        *of_pairs, shape = parts_with_floor(np.square(abs(self.values)), both, pair_size, freq_hz)
         means = np.zeros((2, *size.shape))
-        means[:, self.rows, self.columns] = means[:, self.columns, self.rows] = parts
+        means[:, self.rows, self.columns] = means[:, self.columns, self.rows] = of_pairs
         number = np.count_nonzero(means.any(axis=0), axis=0)
         by_row = means.sum(axis=1) / np.maximum(number, 1)
-        by_row[:, number == 0] = parts.mean(axis=1, keepdims=True)
+        by_row[:, number == 0] = np.mean(of_pairs, axis=1, keepdims=True)
         rest = ~means.any(axis=0)
         means[:, rest] = ((by_row[:, :, None] + by_row[:, None, :]) / 2)[:, rest]
-        return np.asarray(means[0] * near + means[1] * size)
+        return means, shape
+
+    def variance_of_parts(self, near: FloatArray, size: FloatArray, freq_hz: FloatArray) -> FloatArray:
+        """Return the variance of all entries by `parts`, shape (n_freq, m, m)."""
+        (relative, floor), shape = self.parts(near, size, freq_hz)
+        return np.asarray(relative * near + floor * size * shape[:, None, None])
 
     def line_levels(self, variance: FloatArray, inflation: float = 1.0) -> LineLevels:
         """Return slow variation and outlying lines of the noise of FRFs of this variance (n_freq, m, m)."""
@@ -192,11 +258,13 @@ class ReciprocityDifferences:
         squares = abs(self.values) ** 2 / self.pair_variance(variance)
         return float(np.sqrt(medians(squares.ravel()) / np.log(2)))
 
-    def common_level(self, h: ComplexArray, smooth: ComplexArray) -> float:
+    def common_level(self, freq_hz: FloatArray, h: ComplexArray, smooth: ComplexArray) -> float:
         """Return one relative level if it describes the noise: all pairs, no floor, both directions; else 0.
 
         Parameters
         ----------
+        freq_hz : ndarray, shape (n_freq,)
+            Frequencies, Hz.
         h, smooth : ndarray, shape (n_freq, m, m)
             Measured and smooth FRFs.
 
@@ -207,8 +275,8 @@ class ReciprocityDifferences:
         """
         squares, size = np.square(np.abs(self.values)), self.pair_variance(np.square(np.abs(h)))
         n_pairs, n_freq = squares.shape
-        parts = noise_parts(squares, np.stack([size, np.ones_like(size)]))
-        described = np.maximum(parts[0][:, None] * size + parts[1][:, None], TINY)
+        relative, floor, shape = parts_with_floor(squares, size, np.ones(n_pairs), freq_hz)
+        described = np.maximum(relative[:, None] * size + floor[:, None] * shape, TINY)
         power = float((squares / size).mean())
         common = power * size
         gain = 2 * float((np.log(common / described) + squares / common - squares / described).sum())

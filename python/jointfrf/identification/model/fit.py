@@ -14,8 +14,8 @@ from scipy import special
 from scipy.sparse import csgraph
 
 from jointfrf.errors import IllConditionedWarning
-from jointfrf.frf.noise_model import NoiseModel, acceleration_floor, describes_better
-from jointfrf.frf.noise_parts import line_correlation
+from jointfrf.frf.noise_model import NoiseModel
+from jointfrf.frf.noise_parts import acceleration_floor, describes_better, line_correlation
 from jointfrf.frf.smoothing import pieces
 from jointfrf.frf.stated_noise import StatedNoise
 from jointfrf.identification.line_starts import LineCompliance, from_lines, interface_compliance
