@@ -10,7 +10,7 @@ errors of values, widths, seconds.
 
 Mechanisms without an effect in most problems stay, because one kind of test needs each of them:
 
-- level of differences, and measured FRFs where smoothing misses: few lines, and stated noise ten times too small
+- noise of differences, and measured FRFs where smoothing misses: few lines, and stated noise ten times too small
   (standard errors of six DOFs would be 3 to 11 times larger);
 - slow variation of noise: noise that changes over frequency;
 - turns of noise and smoothing: lines that are noise only (seven tests of the noise fail without);
@@ -349,7 +349,7 @@ MECHANISMS: dict[str, list[Change]] = {
     "slow variation of noise": [Change(noise_model, "_model", _flat_levels)],
     "outlying lines": [Change(noise_model, "_model", _no_outliers)],
     "turns of noise and smoothing": [Change(noise_model, "_MOST_TURNS", lambda _: 1)],
-    "level of differences on few lines": [Change(noise_model, "_level_of_differences", _constant(None))],
+    "noise of differences on few lines": [Change(noise_model, "_noise_of_differences", _constant(None))],
     "measured FRFs where smoothing misses": [Change(noise, "_near", lambda _: lambda smooth, h, variance: smooth)],
     "calibration": [Change(calibration_of_frfs, "calibration_errors", _constant(None))],
     "effects of calibration": [Change(mixed, "smooth_effects", lambda _: lambda *_: [])],
