@@ -14,6 +14,7 @@ from jointfrf.frf.bands import line_slices
 from jointfrf.frf.calibration import CalibrationErrors, calibration_errors
 from jointfrf.frf.entry_groups import EntryGroup, entry_groups, reciprocity_noise
 from jointfrf.frf.noise_parts import (
+    LineLevels,
     ReciprocityDifferences,
     acceleration_floor,
     line_correlation,
@@ -53,6 +54,8 @@ _COARSE = 50
 _UNSYMMETRIC = 0.5
 #: Least relative noise for weights: systematic errors of measured FRFs are larger.
 _ROUNDING = 1e-4
+#: Relative differences below which they are rounding and show no noise.
+_EXACT = 1e-10
 
 
 @dataclass(frozen=True)
@@ -388,11 +391,22 @@ class _NoisyLines:
 
 
 class _NoiseParts(NamedTuple):
-    """Relative noise and floor of all entries, shape (n_out, n_in), and the dependence of floor^2 on frequency."""
+    """Noise of all entries without smoothing.
+
+    Attributes
+    ----------
+    relative, floor : ndarray, shape (n_out, n_in)
+        Relative noise, and floor at the median line.
+    shape : ndarray, shape (n_freq,)
+        Dependence of floor^2 on frequency.
+    is_common : bool
+        Whether all entries have one relative level.
+    """
 
     relative: FloatArray
     floor: FloatArray
     shape: FloatArray
+    is_common: bool = False
 
     @property
     def of_acceleration(self) -> bool:
@@ -421,6 +435,8 @@ def _estimated(
     else:
         model = _model(lines.h, smooth, given, inflation or 1.0, differences, robust=False)
     smooth = model.smooth
+    if not smooth.is_smooth:
+        return _without_smoothing(lines, smooth, differences)
     seen = None if differences is None else _noise_of_differences(lines, model, differences)
     if seen is not None:
         return _without_smoothing(lines, replace(smooth, h=lines.h, is_smooth=False), differences, seen)
@@ -462,19 +478,25 @@ def _noise_of_differences(
 
     It does for few and coarse lines, which rational functions miss by as much as their noise or more: if the noise has
     one relative level, or if the residual is far more than the differences. For many lines, noise that h_pq and h_qp
-    share is more likely. Differences of rounding show no noise.
+    share is more likely.
     """
     if len(lines.h) >= _COARSE:
         return None
-    ratio = differences.ratio(model.variance)
-    if ratio * model.level < _ROUNDING:
+    parts = _parts_of_differences(lines, differences, model.smooth.h)
+    is_described = parts is not None and (parts.is_common or differences.ratio(model.variance) < 1 / _MISSED)
+    return parts if is_described else None
+
+
+def _parts_of_differences(
+    lines: _NoisyLines, differences: ReciprocityDifferences, smooth: ComplexArray
+) -> _NoiseParts | None:
+    """Return one relative level if it describes the differences, or else parts by entry; None if they are rounding."""
+    squares = np.square(abs(lines.h))
+    if differences.ratio(squares) < _EXACT:
         return None
-    level = differences.common_level(lines.freq, lines.h, model.smooth.h)
+    level = differences.common_level(lines.freq, lines.h, smooth)
     if level > 0:
         return _relative_noise(lines, level)
-    if ratio >= 1 / _MISSED:
-        return None
-    squares = np.square(abs(lines.h))
     usual = medians(squares.T).T
     (relative, floor), shape = differences.parts(squares, usual, lines.freq)
     return _NoiseParts(np.sqrt(relative), np.sqrt(floor * usual), shape)
@@ -485,7 +507,7 @@ def _relative_noise(lines: _NoisyLines, level: float) -> _NoiseParts:
     relative = np.zeros((1, *lines.h.shape[1:]))
     for group in lines.groups:
         group.put(np.full((len(group.rows), 1), level), relative)
-    return _NoiseParts(relative[0], np.zeros_like(relative[0]), np.ones(len(lines.h)))
+    return _NoiseParts(relative[0], np.zeros_like(relative[0]), np.ones(len(lines.h)), is_common=True)
 
 
 def _initial(
@@ -614,27 +636,29 @@ def _without_smoothing(
     differences: ReciprocityDifferences | None,
     parts: _NoiseParts | None = None,
 ) -> NoiseModel:
-    """Return the noise model for few lines and for nearly exact FRFs; by default one relative level."""
+    """Return the noise model for few lines and for nearly exact FRFs, by differences as far as there are any."""
     h = lines.h
     n_freq, n_out, n_in = h.shape
     source = "reciprocity"
+    if parts is None and differences is not None and smooth.poles:
+        parts = _parts_of_differences(lines, differences, h)
     if parts is None:
         level = float(reciprocity_noise(h[None])[0]) if lines.reciprocal and n_out == n_in else 0.0
         if level == 0:
             level, source = (smooth.level, "residual") if smooth.poles else (0.0, "none")
         parts = _relative_noise(lines, level)
-    variance, factor = parts.variance(np.square(abs(h))), np.ones(n_freq)
+    variance, levels = parts.variance(np.square(abs(h))), LineLevels(np.ones(n_freq), np.ones(n_freq))
     if differences is not None and smooth.poles:  # enough lines to find outlying ones
-        factor = differences.line_levels(lines.weighing(variance)).factor
+        levels = differences.line_levels(lines.weighing(variance))
     return NoiseModel(
         relative=parts.relative,
         floor=parts.floor,
         coherence_factor=np.zeros((n_out, n_in)),
-        variance=variance * factor[:, None, None],
+        variance=variance * levels.factor[:, None, None],
         inflation=1.0,
         inflation_source="none",
         line_level=np.ones(n_freq),
-        line_factor=factor,
+        line_factor=levels.factor,
         source=cast(NoiseSource, source),
         smooth=smooth,
         floor_of_acceleration=parts.of_acceleration,

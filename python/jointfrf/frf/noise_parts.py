@@ -28,6 +28,8 @@ __all__ = [
 _CLEARLY = 6.0
 #: Share of the median line below which a floor of acceleration is constant, because sensors end there.
 _LOWEST = 1e-3
+#: Largest square, relative to its expectation, that counts in a choice: outlying lines have more.
+_CAPPED = 10.0
 #: Number of standard deviations beyond which both directions of a pair have different noise.
 _APART = 4.0
 
@@ -98,21 +100,21 @@ def parts_with_floor(
         E|e|^2 = relative near + floor usual shape.
     shape : ndarray, shape (n_freq,)
         Constant in receptance or in accelerance, whichever describes the squares better.
-
-    Notes
-    -----
-    The ratio of two exponentially distributed squares replaces the exponential distribution in the likelihood: a few
-    lines with another error than noise then do not decide.
     """
     found = []
     for shape in (np.ones(freq_hz.size), acceleration_floor(freq_hz)):
         unit = np.broadcast_to(usual[:, None], squares.shape)
         relative, floor = noise_parts(squares / shape, np.stack([near / shape, unit]), robust=True)
-        median = np.maximum((relative[:, None] * near + floor[:, None] * unit * shape) * np.log(2), TINY)
-        loss = 2 * float((np.log(median) + 2 * np.log1p(squares / median)).sum())
+        loss = _robust_loss(squares, relative[:, None] * near + floor[:, None] * unit * shape)
         found.append((loss, relative, floor, shape))
     constant, accelerated = found
     return (accelerated if describes_better(accelerated[0], constant[0]) else constant)[1:]
+
+
+def _robust_loss(squares: FloatArray, variance: FloatArray) -> float:
+    """Return -2 log likelihood of exponentially distributed squares of this mean; none counts more than `_CAPPED`."""
+    variance = np.maximum(variance, TINY)
+    return 2 * float((np.log(variance) + np.minimum(squares / variance, _CAPPED)).sum())
 
 
 @dataclass(frozen=True)
@@ -154,9 +156,12 @@ def line_levels(noise: ComplexArray, inflation: float = 1.0, *, is_residual: boo
 
 
 def is_smooth(values: ComplexArray) -> bool:
-    """Return whether errors, shape (n_series, n_freq), are smooth: by a lag-one autocorrelation above 1/2."""
-    neighbours = float((values[:, 1:] * values[:, :-1].conj()).real.sum())
-    return neighbours > float(np.square(np.abs(values)).sum()) / 2
+    """Return whether errors, shape (n_series, n_freq), are smooth: phases of neighbouring lines agree by more than 1/2.
+
+    The agreement is the mean cosine of their difference; sizes do not count, because few lines may have most noise.
+    """
+    phasor = values / np.maximum(np.abs(values), TINY)
+    return float((phasor[:, 1:] * phasor[:, :-1].conj()).real.mean()) > 0.5
 
 
 def line_correlation(noise: ComplexArray, share: float = 0.0) -> float:
@@ -270,16 +275,16 @@ class ReciprocityDifferences:
 
         Notes
         -----
-        The likelihood of the differences with one level is compared with the one with parts of each pair. The mean of
-        ln(|h_pq - s|^2 / |h_qp - s|^2) is tested, whose variance is pi^2/3 a line.
+        The robust likelihood of the differences with one level is compared with the one with parts of each pair. The
+        mean of ln(|h_pq - s|^2 / |h_qp - s|^2) is tested, whose variance is pi^2/3 a line.
         """
         squares, size = np.square(np.abs(self.values)), self.pair_variance(np.square(np.abs(h)))
         n_pairs, n_freq = squares.shape
         relative, floor, shape = parts_with_floor(squares, size, np.ones(n_pairs), freq_hz)
-        described = np.maximum(relative[:, None] * size + floor[:, None] * shape, TINY)
-        power = float((squares / size).mean())
-        common = power * size
-        gain = 2 * float((np.log(common / described) + squares / common - squares / described).sum())
+        described = relative[:, None] * size + floor[:, None] * shape
+        ratio = squares / size
+        power = float(np.minimum(ratio, _CAPPED * medians(ratio.ravel())).mean())
+        gain = _robust_loss(squares, power * size) - _robust_loss(squares, described)
         left = np.maximum(abs(h - smooth) ** 2, TINY)
         apart = np.log(left[:, self.rows, self.columns] / left[:, self.columns, self.rows]).mean(axis=0)
         chance = _APART * np.pi / np.sqrt(3 * n_freq)

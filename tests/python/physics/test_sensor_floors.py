@@ -22,24 +22,24 @@ def free_bars(freq_hz):
     return jf.couple(h_a, h_b, joint.dynamic_stiffness(freq_hz), [0, 1], [0, 1])
 
 
-def with_floor(h, freq_hz, power, seed):
-    """FRFs with a floor of 1 % of the median FRF of each kind, constant in h w^power."""
+def with_floor(h, freq_hz, level, power, seed):
+    """FRFs with a floor relative to the median FRF of each kind, constant in h w^power."""
     of_quantity = abs(h) * (freq_hz**power)[:, None, None]
     size = np.zeros(h.shape[1:])
     for rows, columns in itertools.product(OF_KIND, repeat=2):
         size[np.ix_(rows, columns)] = np.median(of_quantity[:, rows[:, None], columns])
     rng = np.random.default_rng(seed)
     noise = rng.standard_normal(h.shape) + 1j * rng.standard_normal(h.shape)
-    return h + 0.01 * size * noise / np.sqrt(2) / (freq_hz**power)[:, None, None]
+    return h + level * size * noise / np.sqrt(2) / (freq_hz**power)[:, None, None]
 
 
 @pytest.mark.parametrize("step", [2.0, 20.0, 40.0])
-@pytest.mark.parametrize("power", [0, 1, 2])
-def test_floors_give_no_warning(power, step):
+@pytest.mark.parametrize(("level", "power"), [(1e-2, 0), (1e-2, 1), (1e-2, 2), (1e-5, 0), (1e-5, 2)])
+def test_floors_give_no_warning(level, power, step):
     freq_hz = np.arange(20.0, 1000.0, step)
     exact, held = free_bars(freq_hz), []
     for seed in range(4):
-        fit = jf.identify(freq_hz, with_floor(exact, freq_hz, power, seed), ["y", "theta"], damping="viscous")
+        fit = jf.identify(freq_hz, with_floor(exact, freq_hz, level, power, seed), ["y", "theta"], damping="viscous")
         assert [str(one) for one in fit.findings if one.severity != "note"] == []
         limits = fit.confidence_interval()
         held += [limits[name][0] <= true <= limits[name][1] for name, true in TRUTH.items()]
