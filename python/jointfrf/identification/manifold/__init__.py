@@ -15,6 +15,7 @@ estimate        strategies tried in order for every group of DOFs, combined
 band_parts      separate fits of parts of the band
 uncertainty     the likelihood linearised; variance by noise, channels and sides; intervals; test of the residual
 flexible_sides  the joint without its sides, from the deformation among the channels
+side_columns    flexible sides as random effects, estimated with the joint
 fit             all of it: noise level, choice of damping, uncertainty
 
 Modules shared with the likelihood of models are in `jointfrf.identification`: linearised, mixed, parameters, minimise,

@@ -29,11 +29,13 @@ from jointfrf.identification.manifold.estimate import (
     estimate_joint,
     estimate_laws,
 )
-from jointfrf.identification.manifold.flexible_sides import JointAlone, SideBending, joint_alone
+from jointfrf.identification.manifold.flexible_sides import FittedCompliance, JointAlone, SideBending, joint_alone
 from jointfrf.identification.manifold.group_fit import GroupFit
 from jointfrf.identification.manifold.line_forms import LEAST_GAIN, FormMinimum
 from jointfrf.identification.manifold.prepare import FitProblem, check_estimate
+from jointfrf.identification.manifold.side_columns import fit_with_flexible_sides
 from jointfrf.identification.manifold.uncertainty import (
+    GroupUncertainty,
     JointUncertainty,
     joint_intervals,
     residual_test_of,
@@ -42,7 +44,7 @@ from jointfrf.identification.manifold.uncertainty import (
 from jointfrf.identification.manifold.unknown_cross import compliance_lines
 from jointfrf.identification.profile import Intervals
 from jointfrf.identification.residual_test import ResidualTest
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
 
 __all__ = [
@@ -65,6 +67,8 @@ _LEAST_EXCESS = 1e-12
 _LEFT_OUT = 0.02
 #: Number of lines below which parts are not compared, and each fit searches all initial values for several minima.
 _FEW = 40
+#: Standard deviations between the middle and the 97.5 % quantile of the flexibility of the sides.
+_REACH = 1.96
 #: Residual of FRFs without noise, in units of the assumed level.
 _NO_NOISE = 1e-3
 
@@ -188,41 +192,56 @@ def _alone(problem: FitProblem, found: JointEstimate, known: JointUncertainty, b
     n, freq = len(problem.dofs), problem.freq_hz
     frfs = problem.frfs if problem.deformation is None else problem.frfs.without(problem.deformation)
     value, spread = np.full((freq.size, n), np.nan, complex), np.full((freq.size, n), np.nan)
-    fitted, size = np.full((3, n), np.nan), np.zeros(n)
-    factor, smooth = known.spread.factor, known.smooth
-    for group in found.groups:
+    fitted = FittedCompliance(*np.full((4, n), np.nan))
+    rotations = np.array([is_rotation(dof) for dof in problem.dofs])
+    for one in known.groups:
+        group = one.at.group
         _, lines = compliance_lines(frfs.of_dofs(group.dofs))
         used = problem.used[:, group.dofs]
         value[:, group.dofs] = np.where(used, lines.value, np.nan)
         spread[:, group.dofs] = np.einsum("ldd->ld", lines.covariance).real
-        fitted[:, group.dofs] = _fitted_compliance(group, (factor[group.which], smooth[group.which]))
-        size[group.dofs] = group.problem.data.own_size
-    rotations = np.array([is_rotation(dof) for dof in problem.dofs])
-    return joint_alone(2 * np.pi * freq, value, spread, (fitted[0], fitted[1], fitted[2]), size, bending, rotations)
+        fitted = fitted.with_group(group.dofs, _through_sides(one, rotations[group.dofs], bending.on(group.dofs)))
+    return joint_alone(2 * np.pi * freq, value, spread, fitted, bending, rotations)
 
 
-def _fitted_compliance(group: GroupFit, factors: Sequence[FloatArray]) -> FloatArray:
-    """Return C_dd at w = 0 of the fitted joint, and its standard errors by the given variance factors, shape (., n)."""
+def _through_sides(known: GroupUncertainty, rotations: NDArray[np.bool_], bending: SideBending) -> FittedCompliance:
+    """Return C_dd of a group by the fit of all lines, with random flexibility of the sides."""
+    group = known.at.group
+    value, slope = _compliance_at_rest(group)
+    _, largest, _ = bending.of_joint(value, rotations)
+    found = fit_with_flexible_sides(group, largest / _REACH)
+    smooth = known.factor - known.spread.factor
+    if found is None:
+        # Inertia changes C as seen by a share of about D/|gamma|.
+        by_sides = largest / _REACH / np.maximum(group.problem.data.own_size, TINY) * abs(value)
+        error, of_channels = _errors(group, slope, known.spread.factor, smooth)
+        return FittedCompliance(value, error, of_channels, by_sides)
+    error, of_channels, by_sides = _errors(group, slope, known.spread.factor * found.noise, smooth, found.sides)
+    return FittedCompliance(value + slope @ found.step, error, of_channels, by_sides)
+
+
+def _errors(group: GroupFit, slope: FloatArray, *factors: FloatArray) -> list[FloatArray]:
+    """Return standard errors of C_dd for variance factors of the coordinates, correlated as between rigid sides."""
+    roots = [slope * np.sqrt(np.maximum(own, 0)) for own in factors]
+    return [np.sqrt(np.maximum(np.einsum("dp,pq,dq->d", r, group.covariance, r), 0)) for r in roots]
+
+
+def _compliance_at_rest(group: GroupFit) -> tuple[FloatArray, FloatArray]:
+    """Return C_dd at w = 0 of the fitted joint, shape (n,), and its derivatives by the coordinates, shape (n, p)."""
     joint, n = group.joint, len(group.dofs)
     if joint.in_compliance:
         stiff = joint.is_compliance
-        value = 1 / joint.theta(group.x)[stiff]
-        own = (np.diagonal(group.covariance) * joint.compliance_slope(group.x) ** 2)[stiff]
-        variances = [own * factor[stiff] for factor in factors]
-    else:
-        diagonal = np.flatnonzero(joint.rows == joint.columns)
-        entries = joint.compliance(group.x)
-        slope = joint.slope(group.x, entries)[:, diagonal].real.mean(axis=0)[:n]
-        # The real part of K* is the same on all lines, the real part of C is not: damping changes it.
-        springs = np.diag(joint.springs)
-        stiffness = (np.linalg.inv(joint.matrix(entries)) - springs).real.mean(axis=0)
-        compliance = np.linalg.inv(stiffness)
-        value = np.diagonal(compliance)[:n]
-        # dC = (1 + C Z) dR (1 + Z C)
-        more = np.diagonal(np.eye(n) + compliance @ springs) ** 2
-        roots = [slope * more[:, None] * np.sqrt(factor) for factor in factors]
-        variances = [np.einsum("dp,pq,dq->d", root, group.covariance, root) for root in roots]
-    return np.array([value, *np.sqrt(np.maximum(variances, 0))])
+        return 1 / joint.theta(group.x)[stiff], np.diag(joint.compliance_slope(group.x))[stiff]
+    diagonal = np.flatnonzero(joint.rows == joint.columns)
+    entries = joint.compliance(group.x)
+    slope = joint.slope(group.x, entries)[:, diagonal].real.mean(axis=0)[:n]
+    # The real part of K* is the same on all lines, the real part of C is not: damping changes it.
+    springs = np.diag(joint.springs)
+    stiffness = (np.linalg.inv(joint.matrix(entries)) - springs).real.mean(axis=0)
+    compliance = np.linalg.inv(stiffness)
+    # dC = (1 + C Z) dR (1 + Z C)
+    more = np.diagonal(np.eye(n) + compliance @ springs) ** 2
+    return np.diagonal(compliance)[:n], slope * more[:, None]
 
 
 def fit_laws(problem: FitProblem, joint: LawJoint) -> ManifoldFit:

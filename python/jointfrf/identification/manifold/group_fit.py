@@ -39,6 +39,7 @@ __all__ = [
     "UnknownCrossTerms",
     "effects_of",
     "fit_dofs",
+    "fitted_frfs",
 ]
 
 #: Maximum number of linearisations.
@@ -309,6 +310,15 @@ def effects_of(
         for left in _of_coordinates(here, normal_forms(own, c, point, some))[0]:
             gradient, squares = np.einsum("lqp,lq->lp", adjoint, left.gradient), left.squares * used
             yield np.where(np.isfinite(gradient), gradient, 0), np.where(np.isfinite(squares), squares, 0)
+
+
+def fitted_frfs(fit: GroupFit, lines: NDArray[np.intp]) -> ComplexArray:
+    """Return the FRFs between joint DOFs at which a fit without unknown cross terms was linearised, on some lines."""
+    own, c = fit.problem.data.on_lines(lines), fit.joint.matrix(fit.forms.compliance[lines])
+    point = (
+        _first_points(own, c) if fit.on is None else OnManifold(fit.on.h[lines], fit.on.q[lines], fit.on.squares[lines])
+    )
+    return frfs_of_joint(point.h, point.q, c, own.reference)
 
 
 class _KernelFit(NamedTuple):

@@ -35,6 +35,7 @@ from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
 __all__ = [
     "GroupLinearised",
+    "GroupUncertainty",
     "JointUncertainty",
     "joint_intervals",
     "profile_interval",
@@ -169,13 +170,17 @@ def _softer(group: GroupFit, compliance: FloatArray) -> FloatArray:
     return found
 
 
-class _GroupUncertainty(NamedTuple):
-    """Uncertainty of one group of DOFs: smooth errors include channels and set-ups, but not sides."""
+class GroupUncertainty(NamedTuple):
+    """Uncertainty of one group of DOFs: smooth errors include channels and set-ups, but not sides.
+
+    `factor` is the variance factor of the intervals by `spread` and smooth errors, as in `JointUncertainty`.
+    """
 
     at: GroupLinearised
     smooth: list[Effect]
     smooth_added: Added
     spread: Spread
+    factor: FloatArray
 
 
 class JointUncertainty(NamedTuple):
@@ -197,7 +202,7 @@ class JointUncertainty(NamedTuple):
         Mean square of the residual that smooth errors leave, in units of the noise, and its standard deviation.
     """
 
-    groups: tuple[_GroupUncertainty, ...]
+    groups: tuple[GroupUncertainty, ...]
     spread: Spread
     smooth: FloatArray
     factor: FloatArray
@@ -260,7 +265,7 @@ def uncertainty_of_joint(
     excess = sum(added.squares for *_, added in columns) / equations
     error = float(np.linalg.norm([added.squares_error for *_, added in columns])) / equations
     scale = max(found.scale / (1 + excess), 1.0) if is_level_known else found.scale
-    groups, covariance = list[_GroupUncertainty](), found.covariance.copy()
+    groups, covariance = list[GroupUncertainty](), found.covariance.copy()
     factor, of_smooth, of_sides = np.zeros((3, p))
     spreads = np.ones((4, p))
     for at, smooth, added in columns:
@@ -276,7 +281,7 @@ def uncertainty_of_joint(
             own = slope @ (added.covariance + sides.covariance) @ slope.T
             whole = covariance[which[:, None], which] * np.outer(root, root)
         covariance[which[:, None], which] = whole + np.nan_to_num(own, posinf=0.0, neginf=0.0)
-        groups.append(_GroupUncertainty(at, smooth, added, spread))
+        groups.append(GroupUncertainty(at, smooth, added, spread, factor[which]))
     return JointUncertainty(
         tuple(groups), Spread(*spreads), of_smooth, factor, of_sides, covariance, float(excess), error
     )
@@ -485,7 +490,7 @@ def _ratio_of_all(found: JointEstimate) -> float:
     return float(np.sqrt(squares / max(equations - len(found.parameters) / 2, 1)))
 
 
-def _trends(known: _GroupUncertainty, freq_hz: FloatArray, inflation: float) -> list[Trend]:
+def _trends(known: GroupUncertainty, freq_hz: FloatArray, inflation: float) -> list[Trend]:
     """Return the parameters that parts of the band disagree on."""
     group, spread = known.at.group, known.spread
     factor = np.fmax(np.maximum(spread.information, inflation), spread.lines)
