@@ -119,7 +119,8 @@ def test_the_joint_alone_is_stiffer_than_seen_by_what_bends():
     np.testing.assert_allclose(found.seen, 1e-8, rtol=3e-3)
     low, high = found.limits
     assert (low < 1e-8).all()
-    assert (high > 1e-8).all()
+    # Inertia changes the fit of all lines and the intercept in different ways: the interval contains both.
+    assert (high > 2e-8).all()
     np.testing.assert_allclose(np.array([6.0, 16.0]) * 2e-10, found.stiffer)
     np.testing.assert_allclose(found.best, found.seen / (1 + np.array([1.1, 3.6]) * 1e-10 / found.seen), rtol=1e-12)
     # Channels a little off move all lines alike: their standard error adds to that of the scatter, in squares.

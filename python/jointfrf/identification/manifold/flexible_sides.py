@@ -436,12 +436,13 @@ def joint_alone(
     Notes
     -----
     There are two estimates of C + D0: the intercept over w^2, and the fit of all lines with flexible sides as random
-    effects. If the FRFs show no deformation beyond noise, the one with the narrower interval counts.
+    effects. If the FRFs show no deformation beyond noise, the one with the narrower interval counts. Otherwise the
+    intercept counts. Inertia of the sides changes both in different ways, so that their difference is in its interval.
     """
     static = _static_compliance(omega, compliance, variance)
     # Errors of channels that are smooth over frequency do not appear in the scatter of lines.
     noise = np.hypot(2 * _INERTIA * static.std_error, _TWO_SIDED * fitted.smooth)
-    inertia = _INERTIA * abs(static.value - static.before)
+    inertia = np.hypot(_INERTIA * abs(static.value - static.before), np.nan_to_num(static.value - fitted.value))
     noise_of_fit, inertia_of_fit = _TWO_SIDED * np.hypot(fitted.error, fitted.smooth), _TWO_SIDED * fitted.by_sides
     of_all = np.hypot(noise_of_fit, inertia_of_fit) < np.hypot(noise, inertia)
     of_all = (of_all & bending.is_noise) | ~np.isfinite(static.value)
