@@ -253,7 +253,8 @@ def _regressed(field: ComplexArray, variance: FloatArray, motion: ComplexArray) 
     size = np.sqrt((motion.real**2 + motion.imag**2).mean(axis=(0, 2))) + TINY
     motion = motion / size[:, None]
     for _ in range(_REGRESSIONS):
-        weight = 1 / (np.maximum(variance, _LEAST_VARIANCE * usual[:, None]) + beside[:, None] + TINY)
+        total = np.maximum(variance, _LEAST_VARIANCE * usual[:, None]) + beside[:, None] + TINY
+        weight = (usual[:, None] + TINY) / total
         normal, right = np.zeros((m, n, n)), np.zeros((m, n))
         for some in line_slices(len(field)):
             conjugate = motion[some].conj()
