@@ -386,7 +386,7 @@ def test_the_page_says_what_the_test_cannot_know(h, between_points):
             assert word in rest
 
 
-def windowed(shape, seed, decay=5.0, length=2.0):
+def decaying_noise(shape, seed, decay=5.0, length=2.0):
     """Unit noise of lines whose records were multiplied by a decaying window: neighbouring lines share it."""
     rng, n = np.random.default_rng(seed), 4 * shape[0]
     window = np.exp(-decay * length * np.arange(n) / n)
@@ -403,7 +403,7 @@ def test_noise_of_zero_frfs_is_no_calibration(h, seed):
     own[np.ix_(range(FREQ.size), [0, 3], [0, 3])] = both
     own[np.ix_(range(FREQ.size), [1, 2, 4, 5], [1, 2, 4, 5])] = h
     size = np.median(abs(np.einsum("lpp->lp", own)), axis=0)
-    noise = 0.01 * np.sqrt(np.outer(size, size)) * windowed(own.shape, seed)
+    noise = 0.01 * np.sqrt(np.outer(size, size)) * decaying_noise(own.shape, seed)
     found = calibration_errors(FREQ, own + noise)
     assert found is None or not found.own.any()
     alone = jf.identify(FREQ, h + noise[:, [1, 2, 4, 5]][:, :, [1, 2, 4, 5]], ["y", "theta"], damping="viscous")
