@@ -32,7 +32,7 @@ __all__ = [
 _ONE_SIDED = 0.3
 #: FRFs whose phase agrees better than this from line to line show circles.
 _CIRCLES_SEEN = 0.5
-#: Turn, rad, weighted by |h|^2, from which an FRF shows a resonance: one turns it by nearly pi where |h| is largest.
+#: Median turn, rad, weighted by |h|^2, of FRFs with resonances, which turn by nearly pi where |h| is largest.
 _LEAST_TURN = 1.0
 #: Share of FRFs that run backwards from which all are conjugated.
 _BACKWARDS = 0.8
@@ -86,8 +86,8 @@ def convention_finding(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -
 
     Im sum conj(h_k) h_k+1 is below zero for exp(+i w t): it is minus the mean arrival time of the energy of the impulse
     response. FRFs count without their mean trend over frequency: otherwise a rigid-body line at the lowest frequencies
-    outweighs the resonances. An antiresonance turns counterclockwise, where |h| is least: an FRF without a resonance
-    does not count.
+    outweighs the resonances. An antiresonance turns counterclockwise, where |h| is least: FRFs without resonances turn
+    by less than a radian.
     """
     use = smooth > max(_CIRCLES_SEEN, 6 / np.sqrt(h.shape[0]))
     if not use.any():
@@ -96,9 +96,8 @@ def convention_finding(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -
     # About the middle of the band: in a narrow one the exponent is large, and powers of w overflow.
     own = own * (omega[:, None] / np.sqrt(omega.min() * omega.max())) ** -mean_exponent(omega, own)
     turned = (own.real[:-1] * own.imag[1:] - own.imag[:-1] * own.real[1:]).sum(axis=0)
-    counts = abs(turned) > _LEAST_TURN * (modulus(own) ** 2).mean(axis=0)
-    share = float((turned[counts] > 0).mean()) if counts.any() else 0.0
-    return Finding("time-convention", {"share": share}) if share >= _BACKWARDS else None
+    share, turn = float((turned > 0).mean()), np.median(turned / (modulus(own) ** 2).mean(axis=0))
+    return Finding("time-convention", {"share": share}) if share >= _BACKWARDS and turn > _LEAST_TURN else None
 
 
 def mean_exponent(omega: FloatArray, h: ComplexArray) -> float:
