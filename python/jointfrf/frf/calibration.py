@@ -28,6 +28,8 @@ from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
 __all__ = ["CalibrationErrors", "ErrorKind", "SetUpErrors", "calibration_errors", "shows_calibration"]
 
+#: Mean square of the FRFs of a pair above which they are a signal, relative to its expectation for noise.
+_SIGNAL = 2.0
 #: Number of functions of frequency that may be calibration, about as slow as an eighth of the band; the same number of
 #: faster ones shows the noise. Number of lines that each needs.
 _SLOW, _LINES = 8, 20
@@ -278,6 +280,7 @@ def calibration_errors(
     elif n_slow:
         again = setups if setups is None else setups.on_lines(lines)
         differences = _differences(freq, h, again, reciprocal=reciprocal)
+    differences = None if differences is None else differences.of_signals()
     if differences is None:
         return _stated_errors(span, setups)
     said = None if setups is None else setups.gain
@@ -407,6 +410,13 @@ class _Differences(NamedTuple):
     of_channels: FloatArray
     of_setups: FloatArray
     is_reciprocity: NDArray[np.bool_]
+
+    def of_signals(self) -> _Differences | None:
+        """Return the pairs whose FRFs are more than noise, which has no relative errors; None if there are none."""
+        are_signals = (4 * np.square(abs(self.mean)) / self.noise).mean(axis=1) > _SIGNAL
+        if are_signals.all():
+            return self
+        return _Differences(*(one[are_signals] for one in self)) if are_signals.any() else None
 
 
 def _of_directions(h: ComplexArray, both: ReciprocityDifferences, variance: FloatArray) -> _Differences:

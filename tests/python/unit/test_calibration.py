@@ -384,3 +384,30 @@ def test_the_page_says_what_the_test_cannot_know(h, between_points):
         rest = " ".join(said_of_blind_spots(fit)[1:])
         for word in ("A delay of all impacts", "resonate", "H1 estimates", "exp(-σt)", "Hann", "1 mm"):
             assert word in rest
+
+
+def decaying_noise(shape, seed, decay=5.0, length=2.0):
+    """Unit noise of lines whose records were multiplied by a decaying window: neighbouring lines share it."""
+    rng, n = np.random.default_rng(seed), 4 * shape[0]
+    window = np.exp(-decay * length * np.arange(n) / n)
+    spectrum = np.fft.fft(rng.standard_normal((n, *shape[1:])) * window[:, None, None], axis=0)
+    return spectrum[1 : shape[0] + 1] / np.sqrt(np.square(window).sum())
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_of_zero_frfs_is_no_calibration(h, seed):
+    """Extension x and bending y, theta of straight beams are not coupled: FRFs between them are noise."""
+    bar = jf.chain([1, 1, 1], [4e7, 4e7, 4e7], [200, 200, 200], ground="start").receptance(FREQ)[:, -1:, -1:]
+    both = jf.couple(bar, bar, jf.Joint([2e7], [100.0], ["x"]).dynamic_stiffness(FREQ), [0], [0])
+    own = np.zeros((FREQ.size, 6, 6), np.complex128)
+    own[np.ix_(range(FREQ.size), [0, 3], [0, 3])] = both
+    own[np.ix_(range(FREQ.size), [1, 2, 4, 5], [1, 2, 4, 5])] = h
+    size = np.median(abs(np.einsum("lpp->lp", own)), axis=0)
+    noise = 0.01 * np.sqrt(np.outer(size, size)) * decaying_noise(own.shape, seed)
+    found = calibration_errors(FREQ, own + noise)
+    assert found is None or not found.own.any()
+    alone = jf.identify(FREQ, h + noise[:, [1, 2, 4, 5]][:, :, [1, 2, 4, 5]], ["y", "theta"], damping="viscous")
+    together = jf.identify(FREQ, own + noise, ["x", "y", "theta"], damping="viscous")
+    for name in ("k_y", "k_theta"):
+        widths = [np.ptp(fit.confidence_interval()[name]) for fit in (alone, together)]
+        assert 0.7 < widths[1] / widths[0] < 1.5

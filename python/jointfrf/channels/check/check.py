@@ -21,7 +21,6 @@ from jointfrf.channels.check.channel_ratios import (
 from jointfrf.channels.check.driving_points import (
     Sectors,
     convention_finding,
-    mean_exponent,
     passivity_findings,
     quantities,
     quantity_findings,
@@ -443,17 +442,15 @@ def _check_channels(state: _Progress) -> None:
 
 def _check_ratios(state: _Progress, m: Measurement, pairs: PairRatios) -> None:
     ratios = channel_ratios(pairs, m.rows.size, least_gain=LEAST_GAIN, least_delay=LEAST_PHASE / m.omega[-1])
-    sector, strength = sectors(m.driving), None
+    sector, strength = sectors(m.driving, pairs.inflation), None
     if m.rows.size == 1:  # no reciprocity: the other responses of the column show the modes
         sector, strength = _of_column(state, m, sector)
-    exponent = mean_exponent(m.omega, m.driving * m.omega[:, None] ** -ratios.power.astype(float))
-    span = float(m.freq_hz[-1] / m.freq_hz[0])
-    found = quantities(ratios.group, ratios.power, ratios.sign, sector, exponent, span, strength)
-    if strength is None and found.power.any():
+    relative = ratios.group, ratios.power, ratios.sign
+    found = quantities(m.omega, m.driving[..., None], *relative, sector, strength)
+    if strength is None and (found.power.any() or (found.sign < 0).any()):
         # |h| between few resonances may rise with frequency as that of accelerances does; residues do not.
         strength = strength_exponent(resonances(m.freq_hz, m.driving))
-        if strength is not None:
-            found = quantities(ratios.group, ratios.power, ratios.sign, sector, exponent, span, strength)
+        found = quantities(m.omega, m.driving[..., None], *relative, sector, strength)
     state.add(quantity_findings(m, found, sector, state.read_as))
     gains = list(gain_findings(m, ratios, state.side))
     is_else_reciprocal = not gains and not any(one.code == "reciprocity" for one in state.findings)

@@ -39,6 +39,8 @@ _SAME = 3.0
 _SMALL = 1e-2
 #: Scatter of log(h_pq / h_qp) above which h_pq and h_qp are not the same FRF; noise of 10 % gives 0.14.
 BROKEN = 0.5
+#: Pairs of different FRFs scatter by more than so many times the noise, which differences of neighbouring lines show.
+_ABOVE_NOISE = 2.0
 #: Scatter of a pair of which one is zero.
 ONE_SIDED = 3.0
 #: Delays that are tried first: this many steps of half a period of the whole band, either way.
@@ -181,7 +183,7 @@ class PairRatios:
     usable : ndarray of bool
         Pairs whose ratio is constant, apart from power, delay and noise.
     broken : ndarray of bool
-        Pairs of two signals that are not the same FRF.
+        Pairs of two signals that differ by more than noise: they are not the same FRF.
     power : ndarray of int
     log_gain, gain_error : ndarray
         Natural logarithm, and its standard error.
@@ -234,7 +236,9 @@ def pair_ratios(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -> PairR
     scatter = medians(modulus(rest).T).T
     typical = medians(modulus(h).T).T
     judged = are_signals(typical, smooth, h.shape[0])[p, q]
-    usable, broken = judged & (scatter < BROKEN), judged & (scatter >= BROKEN)
+    usable = judged & (scatter < BROKEN)
+    noise = medians(modulus(np.diff(rest, axis=0)).T).T / np.sqrt(2)
+    broken = judged & ~usable & (scatter > _ABOVE_NOISE * noise)
     alone = are_one_sided(typical, smooth)[p, q]
     broken |= alone
     scatter[alone] = ONE_SIDED

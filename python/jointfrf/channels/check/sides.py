@@ -11,7 +11,6 @@ import numpy as np
 from jointfrf.channels.check.channel_ratios import unit_of_factor
 from jointfrf.channels.check.driving_points import (
     Sectors,
-    mean_exponent,
     quantities,
     quantity_findings,
     sectors,
@@ -58,16 +57,14 @@ def side_findings(
     driving = np.einsum("faa->fa", h)
     decided = sectors(driving[best])
     quarter = np.array([_most(own) for own in decided.quarter.reshape(2, n)])
-    both = Sectors(quarter, np.median(decided.negative.reshape(2, n), axis=1))
-    # of displacements only: rotations per moment follow the same exponent
+    mixed = decided.mixed.reshape(2, n).mean(axis=1) > 0.5
+    both = Sectors(quarter, np.median(decided.negative.reshape(2, n), axis=1), mixed)
     omega = 2 * np.pi * freq_hz
     powers = np.array([0, -power]) - min(0, -power)
     signs = np.array([1, -1 if log_factor.imag != 0 else 1])
-    exponent = mean_exponent(omega, driving * omega[:, None] ** -np.repeat(powers, n).astype(float))
     named = as_measurement(freq_hz, h[:, :2, :2], _SIDES, _SIDES, np.zeros((2, 2), bool))
-    span = float(freq_hz[-1] / freq_hz[0])
-    group = np.zeros(2, np.intp)
-    found = quantities(group, powers.astype(np.intp), signs.astype(np.intp), both, exponent, span)
+    group, own = np.zeros(2, np.intp), driving.reshape(omega.size, 2, n)
+    found = quantities(omega, own, group, powers.astype(np.intp), signs.astype(np.intp), both)
     for one in (
         *quantity_findings(named, found, both, read_as),
         *sign_findings(named, found, both, 1, may_rotate=False),

@@ -210,7 +210,7 @@ def check_signals(measurement: Measurement) -> tuple[list[Finding], list[int], l
     Returns
     -------
     tuple of list
-        Findings, and the responses and forces that no other check can use.
+        Findings, and the responses and forces that no other check can use, which include hidden ones.
     """
     findings: list[Finding] = []
     bad: list[list[int]] = []
@@ -218,15 +218,17 @@ def check_signals(measurement: Measurement) -> tuple[list[Finding], list[int], l
     # Reciprocal to rounding: calculated, or made so; equal channels are then no copies of noise.
     is_exact = bool(square.size and abs(square - square.swapaxes(1, 2)).max() <= _EXACT * abs(square).max())
     across, paired = measurement.h.swapaxes(1, 2), _reciprocal(measurement)
-    for word, names, h, smooth, is_reciprocal in (
-        ("response", measurement.responses, measurement.h, measurement.smoothness, paired[0]),
-        ("force", measurement.forces, across, measurement.smoothness.T, paired[1]),
+    unknown = measurement.hidden.all(axis=1), measurement.hidden.all(axis=0)
+    for word, names, h, smooth, is_reciprocal, is_hidden in (
+        ("response", measurement.responses, measurement.h, measurement.smoothness, paired[0], unknown[0]),
+        ("force", measurement.forces, across, measurement.smoothness.T, paired[1], unknown[1]),
     ):
         best = smooth.max(axis=1)
         # FRFs on few, coarse lines are not smooth, but no noise.
         like_noise = (len(h) * (smooth**2).mean(axis=1) < _OF_NOISE) & ~is_reciprocal
-        dead = np.flatnonzero((best < LEAST_SMOOTHNESS) | ((best < least) & like_noise)).tolist()
-        for i in dead:
+        is_dead = (best < LEAST_SMOOTHNESS) | ((best < least) & like_noise)
+        dead = np.flatnonzero(is_dead | is_hidden).tolist()
+        for i in np.flatnonzero(is_dead & ~is_hidden).tolist():
             numbers = {"agreement": float(best[i]), "least": least}
             findings.append(
                 Finding("dead-channel", numbers, (f"{word} {names[i]}",), variant="" if best[i] else "zero")

@@ -421,8 +421,8 @@ def check_joint_seen(freq: FloatArray, smooth: ComplexArray, variance: FloatArra
     level = float(medians(noise.ravel()))
     if level >= _HIDDEN:
         raise ValueError(
-            f"gamma consists of noise: {shown_percent(level)} of the driving points ({span}); measure more averages or "
-            "another band"
+            f"gamma consists of noise: {shown_percent(level)} of the driving points ({len(freq)} lines, {span}), or "
+            "its lines are too coarse to show the noise. Measure more averages or finer lines, or state the noise"
         )
     across = squares > ZERO**2 * np.maximum(driving[:, :, None] * driving[:, None, :], _TINY)
     if not across[:, :n, n:].any() and not across[:, n:, :n].any():
