@@ -310,8 +310,8 @@ def interface(
     coordinates : mapping of int to array_like, shape (3,)
         Positions of the nodes, m.
     bending_stiffness : float, optional
-        E I of the sides, N m^2, from which `difference_error` estimates what rotations miss; `identify` widens their
-        intervals by it.
+        E I of the sides, N m^2, which gives the compliance that bending between the points adds to rotations
+        (`difference_error`) and to displacements across the line; `identify` widens the intervals by it.
     highest_hz : float, optional
         Upper end of the band, Hz, for the warning.
 
@@ -359,12 +359,24 @@ def interface(
     motion = block_diag(_motion(channels_j, coordinates, at_j), _motion(channels_k, coordinates, at_k))
     compliance = None
     if bending_stiffness is not None:
-        reach = [np.ptp([coordinates[node] for node in points], axis=0).max() / 2 for points in (points_j, points_k)]
-        # Half of what both sides together add is that of each.
-        own = sum(difference_error([-r, r], bending_stiffness, 1.0).compliance / 2 for r in reach if r > 0)
-        compliance = np.where(np.array(places) < len(_AXES), 0.0, own)
+        extents = [np.ptp([coordinates[node] for node in points], axis=0) for points in (points_j, points_k)]
+        compliance = np.sum([_added_compliance(extent / 2, bending_stiffness) for extent in extents], axis=0)[places]
     transform = block_diag(rows_j, rows_k)
     return Interface((*channels_j, *channels_k), transform, (at_j, at_k), direction_names(dofs), motion, compliance)
+
+
+def _added_compliance(reach: FloatArray, bending_stiffness: float) -> FloatArray:
+    """Return the compliance that bending of a side between its points adds to each direction, shape (6,).
+
+    The couple of forces at +-r adds r/(6 E I) to a rotation (`difference_error`). Half a force at each of +-r, read as
+    the mean displacement, adds r^3/(6 E I) to a displacement across the line, likewise by strain energy.
+    """
+    r, line = float(reach.max()), int(reach.argmax())
+    if r == 0:
+        return np.zeros(2 * len(_AXES))
+    rotation = difference_error([-r, r], bending_stiffness, 1.0).compliance / 2
+    across = np.where(np.arange(len(_AXES)) == line, 0.0, r**2 * rotation)
+    return np.concatenate([across, np.full(len(_AXES), rotation)])
 
 
 def _warn_of_extent(
