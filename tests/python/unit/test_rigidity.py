@@ -164,12 +164,16 @@ def test_an_offset_takes_a_rotation_for_a_displacement():
     assert left_out_dofs(h, jf.virtual_interface(whole[1], whole[1])) == ()
 
 
-def test_the_bending_expected_between_points_is_that_of_difference_error():
+def test_the_bending_expected_between_points_is_the_strain_energy():
+    """Of half a force, or of a force 1/(2 r), at both points, held in the middle."""
     places = {i: (0.01 * i, 0, 0) for i in (1, 2, 3, 4)}
-    sides = jf.interface([1, 2], [3, 4], ["y", "theta_z"], places, bending_stiffness=30.0)
-    expected = jf.difference_error([-0.005, 0.005], 30.0, 1.0).compliance
-    np.testing.assert_allclose(sides.compliance, [0, expected])
-    assert DOFS[5] == sides.dofs[1]
+    sides = jf.interface([1, 2], [3, 4], ["x", "y", "theta_z"], places, bending_stiffness=30.0)
+    r = 0.005
+    x = np.linspace(0, r, 2001)
+    moment = {"y": (r - x) / 2, "theta_z": (r - x) / (2 * r)}
+    expected = [0, *(2 * 2 * np.trapezoid(m**2, x) / 30.0 for m in moment.values())]
+    np.testing.assert_allclose(sides.compliance, expected, rtol=1e-5)
+    assert sides.compliance[2] == pytest.approx(jf.difference_error([-r, r], 30.0, 1.0).compliance)
 
 
 @pytest.mark.filterwarnings("ignore::jointfrf.IdentificationWarning")
