@@ -114,7 +114,7 @@ def test_the_joint_alone_is_stiffer_than_seen_by_what_bends():
     c = 1e-8 * (1 + x + x**2)[:, None] + noise
     # Deformation beyond noise: the intercept counts.
     bending = SideBending(*(np.full(2, v) for v in (1e-10, 2e-10, 1e-2, 1e2, 1e3)))
-    fitted = FittedCompliance(np.full(2, 2e-8), np.full(2, 1e-12), np.zeros(2), np.zeros(2))
+    fitted = FittedCompliance(np.full(2, 2e-8), np.full(2, 1e-12), np.zeros(2), np.zeros(2), np.zeros(2, bool))
     found = joint_alone(omega, c, np.full((200, 2), 2e-22), fitted, bending, np.array([False, True]))
     np.testing.assert_allclose(found.seen, 1e-8, rtol=3e-3)
     low, high = found.limits

@@ -192,7 +192,7 @@ def _alone(problem: FitProblem, found: JointEstimate, known: JointUncertainty, b
     n, freq = len(problem.dofs), problem.freq_hz
     frfs = problem.frfs if problem.deformation is None else problem.frfs.without(problem.deformation)
     value, spread = np.full((freq.size, n), np.nan, complex), np.full((freq.size, n), np.nan)
-    fitted = FittedCompliance(*np.full((4, n), np.nan))
+    fitted = FittedCompliance.unknown(n)
     rotations = np.array([is_rotation(dof) for dof in problem.dofs])
     for one in known.groups:
         group = one.at.group
@@ -205,19 +205,22 @@ def _alone(problem: FitProblem, found: JointEstimate, known: JointUncertainty, b
 
 
 def _through_sides(known: GroupUncertainty, rotations: NDArray[np.bool_], bending: SideBending) -> FittedCompliance:
-    """Return C_dd of a group by the fit of all lines, with random flexibility of the sides."""
+    """Return C_dd of a group by the fit of all lines, with random flexibility of the sides unless it is negligible."""
     group = known.at.group
     value, slope = _compliance_at_rest(group)
     _, largest, _ = bending.of_joint(value, rotations)
-    found = fit_with_flexible_sides(group, largest / _REACH)
     smooth = known.factor - known.spread.factor
+    error, of_channels = _errors(group, slope, known.spread.factor, smooth)
+    # Inertia changes C as seen by a share of about D/|gamma|.
+    by_sides = largest / _REACH / np.maximum(group.problem.data.own_size, TINY) * abs(value)
+    is_rigid = _REACH * by_sides <= error
+    between_rigid = FittedCompliance(value, error, of_channels, by_sides, is_rigid)
+    found = fit_with_flexible_sides(group, largest / _REACH)
     if found is None:
-        # Inertia changes C as seen by a share of about D/|gamma|.
-        by_sides = largest / _REACH / np.maximum(group.problem.data.own_size, TINY) * abs(value)
-        error, of_channels = _errors(group, slope, known.spread.factor, smooth)
-        return FittedCompliance(value, error, of_channels, by_sides)
-    error, of_channels, by_sides = _errors(group, slope, known.spread.factor * found.noise, smooth, found.sides)
-    return FittedCompliance(value + slope @ found.step, error, of_channels, by_sides)
+        return between_rigid
+    through = value + slope @ found.step, *_errors(group, slope, known.spread.factor * found.noise, smooth, found.sides)
+    kept = (np.where(is_rigid, one, other) for one, other in zip(between_rigid, (*through, is_rigid), strict=True))
+    return FittedCompliance(*kept)
 
 
 def _errors(group: GroupFit, slope: FloatArray, *factors: FloatArray) -> list[FloatArray]:

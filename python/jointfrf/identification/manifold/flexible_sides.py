@@ -8,7 +8,7 @@ determine D0 only within a factor.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -396,16 +396,25 @@ class FittedCompliance(NamedTuple):
         Estimate.
     error, smooth, by_sides : ndarray
         Standard errors by noise, by smooth errors of the channels, and by flexible sides.
+    is_rigid : ndarray of bool
+        Whether the sides change it by less than its noise: it is then of the fit between rigid sides.
     """
 
     value: FloatArray
     error: FloatArray
     smooth: FloatArray
     by_sides: FloatArray
+    is_rigid: NDArray[np.bool_]
+
+    @classmethod
+    def unknown(cls, n: int) -> FittedCompliance:
+        """Return the compliance of n DOFs before their fit."""
+        value, error, smooth, by_sides = np.full((4, n), np.nan)
+        return cls(value, error, smooth, by_sides, np.zeros(n, np.bool_))
 
     def with_group(self, dofs: NDArray[np.intp], own: FittedCompliance) -> FittedCompliance:
         """Return the same with the results of some DOFs."""
-        found = [np.array(one) for one in self]
+        found: list[NDArray[Any]] = [np.array(one) for one in self]
         for one, result in zip(found, own, strict=True):
             one[dofs] = result
         return FittedCompliance(*found)
@@ -437,8 +446,9 @@ def joint_alone(
     Notes
     -----
     There are two estimates of C + D0: the intercept over w^2, and the fit of all lines with flexible sides as random
-    effects. If the FRFs show no deformation beyond noise, the one with the narrower interval counts. Otherwise the
-    intercept counts. Inertia of the sides changes both in different ways, so that their difference is in its interval.
+    effects. If the sides change the fit by less than its noise, the fit counts; if the FRFs show no deformation beyond
+    noise, the one with the narrower interval. Otherwise the intercept counts. Inertia of the sides changes both in
+    different ways, so that their difference is in its interval.
     """
     static = _static_compliance(omega, compliance, variance)
     # Errors of channels that are smooth over frequency do not appear in the scatter of lines.
@@ -446,7 +456,7 @@ def joint_alone(
     inertia = np.hypot(_INERTIA * abs(static.value - static.before), np.nan_to_num(static.value - fitted.value))
     noise_of_fit, inertia_of_fit = _TWO_SIDED * np.hypot(fitted.error, fitted.smooth), _TWO_SIDED * fitted.by_sides
     of_all = np.hypot(noise_of_fit, inertia_of_fit) < np.hypot(noise, inertia)
-    of_all = (of_all & bending.is_noise) | ~np.isfinite(static.value)
+    of_all = (of_all & bending.is_noise) | fitted.is_rigid | ~np.isfinite(static.value)
     seen, noise, inertia = (
         np.where(of_all, fit, line)
         for fit, line in ((fitted.value, static.value), (noise_of_fit, noise), (inertia_of_fit, inertia))
