@@ -14,7 +14,6 @@ from jointfrf.frf.bands import line_slices
 from jointfrf.frf.calibration import CalibrationErrors, calibration_errors
 from jointfrf.frf.entry_groups import EntryGroup, entry_groups, reciprocity_noise
 from jointfrf.frf.noise_parts import (
-    LineLevels,
     ReciprocityDifferences,
     acceleration_floor,
     line_correlation,
@@ -647,18 +646,18 @@ def _without_smoothing(
         if level == 0:
             level, source = (smooth.level, "residual") if smooth.poles else (0.0, "none")
         parts = _relative_noise(lines, level)
-    variance, levels = parts.variance(np.square(abs(h))), LineLevels(np.ones(n_freq), np.ones(n_freq))
+    variance, factor = parts.variance(np.square(abs(h))), np.ones(n_freq)
     if differences is not None and smooth.poles:  # enough lines to find outlying ones
-        levels = differences.line_levels(lines.weighing(variance))
+        factor = differences.line_levels(lines.weighing(variance)).factor
     return NoiseModel(
         relative=parts.relative,
         floor=parts.floor,
         coherence_factor=np.zeros((n_out, n_in)),
-        variance=variance * levels.factor[:, None, None],
+        variance=variance * factor[:, None, None],
         inflation=1.0,
         inflation_source="none",
         line_level=np.ones(n_freq),
-        line_factor=levels.factor,
+        line_factor=factor,
         source=cast(NoiseSource, source),
         smooth=smooth,
         floor_of_acceleration=parts.of_acceleration,
